@@ -1,0 +1,1 @@
+"""What runs on the auditor's machine: from a recording to a verdict."""

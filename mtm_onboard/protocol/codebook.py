@@ -1,0 +1,56 @@
+"""The codebook: all waveforms of a key and a scheme, computed only when asked for."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.keystream import SECRET_BYTES
+from mtm_onboard.protocol.scheme import Channel, Scheme
+from mtm_onboard.protocol.waveform import Complexes, Floats, draw_tones, evaluate, phasors, tone_bins
+
+
+class Codebook:
+    """Waveforms of one secret under one scheme. `epoch` defaults to the scheme's own."""
+
+    def __init__(self, secret: bytes, scheme: Scheme, epoch: int | None = None) -> None:
+        if len(secret) != SECRET_BYTES:
+            raise MtmError(f"a secret has {SECRET_BYTES} bytes, not {len(secret)}; make one with mtm-onboard keygen")
+        self._secret = secret
+        self.scheme = scheme
+        self.epoch = scheme.epoch if epoch is None else epoch
+
+    def __repr__(self) -> str:
+        return f"Codebook(scheme={self.scheme.name!r}, epoch={self.epoch})"
+
+    def bins(self, channel: Channel) -> NDArray[np.int64]:
+        """In-band bins of the channel's window, shape (K,)."""
+        return tone_bins(self.scheme.window_ticks(channel), self.scheme.rate_hz, self.scheme.band_hz)
+
+    def tones(self, channel: Channel, window: int, symbols: Sequence[int] | None = None) -> Complexes:
+        """Complex tones of the asked symbols (all M when None): shape (symbols, axes, K), see `waveform.phasors`.
+
+        `window` counts this channel's windows from the first one of the epoch; under the fixed schedule every
+        window shares one set of waveforms. Raises MtmError for a symbol outside the alphabet.
+        """
+        scheme = self.scheme
+        asked = range(scheme.alphabet_size) if symbols is None else symbols
+        played = 0 if scheme.schedule == "fixed" else window
+        first_axis = scheme.axis_index(channel)
+        count = len(self.bins(channel))
+        amplitudes = np.empty((len(asked), len(channel.axes), count))
+        phases_rad = np.empty_like(amplitudes)
+        for row, symbol in enumerate(asked):
+            if not 0 <= symbol < scheme.alphabet_size:
+                raise MtmError(f"symbol {symbol} is outside the alphabet; choose 0 to {scheme.alphabet_size - 1}")
+            for axis in range(len(channel.axes)):
+                amplitudes[row, axis], phases_rad[row, axis] = draw_tones(
+                    self._secret, self.epoch, played, symbol, first_axis + axis, count
+                )
+        return phasors(amplitudes, phases_rad, scheme.power)
+
+    def samples(self, channel: Channel, window: int, symbols: Sequence[int] | None = None) -> Floats:
+        """Unit-variance waveforms at the window's whole ticks: shape (symbols, axes, window_ticks)."""
+        ticks = self.scheme.window_ticks(channel)
+        return evaluate(self.tones(channel, window, symbols), self.bins(channel), ticks, np.arange(ticks))

@@ -1,0 +1,121 @@
+"""The key file: a secret and the scheme it was provisioned for, in TOML, readable by its owner alone."""
+
+import os
+import re
+import secrets
+import stat
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mtm_onboard.protocol.atomicfile import replacing
+from mtm_onboard.protocol.codebook import Codebook
+from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.keystream import SECRET_BYTES
+from mtm_onboard.protocol.scheme import Scheme, scheme_from_table
+
+KEY_FORMAT = 1
+_FIELDS = {"format", "id", "secret", "scheme"}
+_SCHEME_PARAMETERS = (
+    "version", "name", "rate_hz", "band_hz", "alphabet_size", "message_ticks",
+    "combine", "pooling", "power", "schedule", "epoch",
+)  # fmt: skip
+_CHANNEL_PARAMETERS = ("name", "body", "axes", "symbols", "sigma")
+
+
+@dataclass(frozen=True)
+class Key:
+    """A named secret and its scheme. The secret never appears in `repr`, logs or error texts."""
+
+    id: str
+    secret: bytes = field(repr=False)
+    scheme: Scheme
+
+    def codebook(self) -> Codebook:
+        """All waveforms of this key."""
+        return Codebook(self.secret, self.scheme)
+
+
+def generate_key(key_id: str, scheme: Scheme) -> Key:
+    """A key with a fresh secret from the operating system's generator."""
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", key_id):
+        raise MtmError(
+            f"the key id {key_id!r} is not usable; take 1 to 64 letters, digits, dots, dashes or underscores"
+        )
+    return Key(key_id, secrets.token_bytes(SECRET_BYTES), scheme)
+
+
+def save_key(key: Key, path: Path) -> None:
+    """Write the key file with mode 0600, whole or not at all; an existing file is refused, never overwritten."""
+    if path.exists():
+        raise MtmError(f"{path} exists already; choose another name or remove it first")
+    with replacing(path, mode=0o600) as temporary:
+        temporary.write_text(key_text(key), encoding="utf-8")
+
+
+def key_text(key: Key) -> str:
+    """The key file's text, secret included."""
+    lines = [f"format = {KEY_FORMAT}", f'id = "{key.id}"', f'secret = "{key.secret.hex()}"', "", "[scheme]"]
+    lines += [f"{name} = {_toml(getattr(key.scheme, name))}" for name in _SCHEME_PARAMETERS]
+    for channel in key.scheme.channels:
+        lines += ["", "[[scheme.channels]]"]
+        lines += [f"{name} = {_toml(getattr(channel, name))}" for name in _CHANNEL_PARAMETERS]
+    return "\n".join(lines) + "\n"
+
+
+def load_key(path: Path) -> Key:
+    """Read a key file; raises MtmError with one sentence that says what to change."""
+    table = _read_private_toml(path)
+    unknown = sorted(table.keys() - _FIELDS)
+    if unknown:
+        raise MtmError(f"{path} has an unknown field {unknown[0]!r}; remove it or correct its spelling")
+    if table.get("format") != KEY_FORMAT:
+        raise MtmError(
+            f"{path} is of key format {table.get('format')!r}, this program reads {KEY_FORMAT}; provision it anew"
+        )
+    missing = sorted(_FIELDS - table.keys())
+    if missing:
+        raise MtmError(f"{path} lacks {', '.join(missing)}; it may be cut off, so provision it anew")
+    if not isinstance(table["id"], str) or not isinstance(table["scheme"], dict):
+        raise MtmError(f"{path}: id must be text and scheme a table; provision it anew")
+    try:
+        scheme = scheme_from_table(table["scheme"])
+    except MtmError as error:
+        raise MtmError(f"{path}: {error}") from error
+    return Key(table["id"], _secret(table["secret"], path), scheme)
+
+
+def _secret(text: Any, path: Path) -> bytes:
+    digits = 2 * SECRET_BYTES
+    if not isinstance(text, str) or not re.fullmatch(rf"[0-9a-fA-F]{{{digits}}}", text):
+        length = len(text) if isinstance(text, str) else "no"
+        raise MtmError(f"{path}: the secret must be {digits} hexadecimal digits, and this one is {length} characters "
+                       "or holds others; provision it anew")  # fmt: skip
+    return bytes.fromhex(text)
+
+
+def _read_private_toml(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as file:
+            mode = os.fstat(file.fileno()).st_mode
+            if not stat.S_ISREG(mode):
+                raise MtmError(f"{path} is not a file; name a key file")
+            if mode & 0o077:
+                raise MtmError(f"{path} can be read by others (mode {mode & 0o777:04o}); run: chmod 600 {path}")
+            return tomllib.loads(file.read().decode("utf-8"))
+    except OSError as error:
+        raise MtmError(f"cannot read the key file {path}: {error.strerror}; check the name") from error
+    except UnicodeDecodeError as error:
+        raise MtmError(f"{path} is not a key file (not text); name the file that mtm-onboard keygen wrote") from error
+    except tomllib.TOMLDecodeError as error:
+        # The parser's message may quote the line, and the line may hold the secret.
+        raise MtmError(f"{path} is not valid TOML; name the file that mtm-onboard keygen wrote") from error
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_toml(item) for item in value) + "]"
+    return repr(value)

@@ -1,0 +1,1 @@
+"""Robot links, one a file, all behind `base.Transport`."""

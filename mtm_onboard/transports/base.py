@@ -1,0 +1,50 @@
+"""The seam between the runtime and a robot: one body velocity out, and always a stop at the end."""
+
+from abc import ABC, abstractmethod
+from types import TracebackType
+from typing import Self
+
+from mtm_onboard.motion import BodyVelocity
+
+
+class Transport(ABC):
+    """A link to one robot. As a context manager it opens the link, and leaving it always sends stop and closes.
+
+    A subclass implements `open`, `send`, `stop` and `close`. `send` refuses non-finite velocities with ValueError
+    before anything is packed. `service` does what the link needs between commands (heartbeats, telemetry); the
+    runtime calls it at least every `service_period_s`, on the robot from a thread of its own, so a subclass guards
+    whole messages with a lock.
+    """
+
+    service_period_s: float = 0.010
+
+    @abstractmethod
+    def open(self) -> None:
+        """Bring the link up and make the robot ready to move; raises MtmError when that fails."""
+
+    @abstractmethod
+    def send(self, velocity: BodyVelocity) -> None:
+        """Send one command; raises ValueError for non-finite values and MtmError when the link is down."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Send what makes the robot stand still; safe to call more than once."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release the link; safe to call more than once."""
+
+    def service(self, now_s: float) -> None:  # noqa: B027 - most links need nothing between commands
+        """Do what is due at `now_s` (seconds of the runtime's clock)."""
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self.stop()
+        finally:
+            self.close()
