@@ -1,0 +1,1 @@
+"""What sees the robots: a software camera and a motion-capture system."""

@@ -1,0 +1,1 @@
+"""Reading recordings: video into frames, motion capture into tracks."""
