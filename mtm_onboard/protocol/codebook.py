@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.keystream import SECRET_BYTES
 from mtm_onboard.protocol.scheme import Channel, Scheme
-from mtm_onboard.protocol.waveform import Complexes, Floats, draw_tones, evaluate, phasors, tone_bins
+from mtm_onboard.protocol.waveform import Complexes, Floats, draw_tones, evaluate_window, phasors, tone_bins
 
 
 class Codebook:
@@ -52,5 +52,5 @@ class Codebook:
 
     def samples(self, channel: Channel, window: int, symbols: Sequence[int] | None = None) -> Floats:
         """Unit-variance waveforms at the window's whole ticks: shape (symbols, axes, window_ticks)."""
-        ticks = self.scheme.window_ticks(channel)
-        return evaluate(self.tones(channel, window, symbols), self.bins(channel), ticks, np.arange(ticks))
+        tones = self.tones(channel, window, symbols)
+        return evaluate_window(tones, self.bins(channel), self.scheme.window_ticks(channel))

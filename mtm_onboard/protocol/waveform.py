@@ -70,3 +70,11 @@ def evaluate(tones: Complexes, bins: NDArray[np.int64], window_ticks: int, ticks
     basis = tone_basis(bins, window_ticks, ticks)
     samples: Floats = tones.real @ basis.real.T - tones.imag @ basis.imag.T
     return samples
+
+
+def evaluate_window(tones: Complexes, bins: NDArray[np.int64], window_ticks: int) -> Floats:
+    """`evaluate` at the window's whole ticks, (..., window_ticks), by a Fourier transform: quick for long windows."""
+    spectrum = np.zeros((*tones.shape[:-1], window_ticks // 2 + 1), dtype=np.complex128)
+    spectrum[..., bins] = tones * (window_ticks / 2)
+    samples: Floats = np.fft.irfft(spectrum, window_ticks)
+    return samples
