@@ -9,6 +9,8 @@ from mtm_onboard.protocol.errors import MtmError
 _BINS_PER_DECADE = 20
 _SHORTEST_S = 1e-6
 _DECADES = 7
+# Clocks of finite resolution and sums of floats stand a hair before a deadline they have reached, in ticks.
+_HAIR = 1e-4
 
 
 class Lateness:
@@ -64,15 +66,14 @@ def run_loop(
     if not (math.isfinite(rate_hz) and rate_hz > 0):
         raise MtmError(f"the loop's rate is {rate_hz} Hz; give a number above zero")
     stats = LoopStats() if stats is None else stats
-    awaited = math.ceil((clock.now() - start_s) * rate_hz)
+    awaited = math.ceil((clock.now() - start_s) * rate_hz - _HAIR)
     while True:
         deadline_s = start_s + awaited / rate_hz
         clock.sleep_until(deadline_s)
         if stop():
             return stats
         now_s = clock.now()
-        # A clock of finite resolution may wake a hair early: the awaited tick is then still the one to send.
-        tick = max(awaited, math.floor((now_s - start_s) * rate_hz))
+        tick = max(awaited, math.floor((now_s - start_s) * rate_hz + _HAIR))
         stats.lateness.record(now_s - deadline_s)
         stats.missed += tick - awaited
         step(tick, now_s)

@@ -130,12 +130,22 @@ class StdinSource(_TextSource):
         """Read the lines that are there; the last good one wins."""
         arrived_s = self._arrival_s(now_s)
         for _ in range(_MOST_READS):
-            if self._ended or not select.select([self._descriptor], [], [], 0)[0]:
+            data = self._read()
+            if not data:
                 break
-            data = os.read(self._descriptor, 4096)
-            self._ended = not data
             self._split(data, arrived_s)
         return self._newest
+
+    def _read(self) -> bytes:
+        try:
+            if self._ended or not select.select([self._descriptor], [], [], 0)[0]:
+                return b""
+            data = os.read(self._descriptor, 4096)
+        except OSError:
+            # A descriptor that was never open, or a terminal that is gone: the same as its end.
+            data = b""
+        self._ended = not data
+        return data
 
     def _split(self, data: bytes, arrived_s: float) -> None:
         *lines, self._begun = (self._begun + data).split(b"\n")
