@@ -1,0 +1,222 @@
+import math
+import threading
+
+import can
+import pytest
+
+from mtm_onboard.motion import STOP, BodyVelocity
+from mtm_onboard.protocol import MtmError
+from mtm_onboard.transports.duml import Parser, encode, segment
+from mtm_onboard.transports.robomaster_can import RoboMasterCan
+from mtm_onboard.transports.robomaster_messages import WORK_MODE
+from tests.onboard.transports.can_rig import can_rig
+from tests.onboard.transports.conformance import Rig, TransportConformance
+
+FORWARD = BodyVelocity(0.5, 0.0, 0.0)
+
+
+class TestRoboMasterCanConforms(TransportConformance):
+    @pytest.fixture
+    def rig(self):
+        with can_rig() as rig:
+            yield Rig(rig.transport, rig.controller, rig.plant, rig.clock, lambda: sum(map(len, rig.sent())))
+
+
+class BrokenBus:
+    """Refuses the frames whose numbers are in `refused`, and keeps the others."""
+
+    def __init__(self, refused):
+        self.refused = refused
+        self.tried = 0
+        self.kept = []
+        self.is_shut_down = False
+
+    def send(self, msg, timeout=None):
+        self.tried += 1
+        if self.tried in self.refused:
+            raise can.CanOperationError("bus off")
+        self.kept.append(msg)
+
+    def recv(self, timeout=None):
+        return None
+
+    def shutdown(self):
+        self.is_shut_down = True
+
+
+OPENING_FRAMES = 2 + 3 + 6 + 2 + 4  # unsubscribe, add node, subscribe, work mode, zero speed
+
+
+def commands(frames):
+    messages = Parser().feed(b"".join(bytes(frame.data) for frame in frames))
+    return [(message.cmdset, message.cmdid, message.payload) for message in messages]
+
+
+RELEASE = [(0x3F, 0x21, bytes(12)), (0x3F, 0x19, b"\x00")]
+
+
+def test_opening_subscribes_engages_and_stands_still_in_that_order():
+    with can_rig() as rig:
+        rig.transport.open()
+        assert [command[:2] for command in commands(rig.sent())] == [
+            (0x48, 0x04),
+            (0x48, 0x01),
+            (0x48, 0x03),
+            (0x3F, 0x19),
+            (0x3F, 0x21),
+        ]
+        assert len(rig.sent()) == OPENING_FRAMES
+
+
+def test_every_message_starts_a_frame_of_its_own_on_the_controllers_id():
+    with can_rig() as rig, rig.transport:
+        rig.transport.send(FORWARD)
+        rig.run(0.1)
+        starts = [frame for frame in rig.sent() if frame.data[0] == 0x55]
+        assert len(starts) == len(commands(rig.sent()))
+        assert all(frame.arbitration_id == 0x201 and not frame.is_extended_id for frame in rig.sent())
+
+
+def test_a_heartbeat_goes_out_each_ten_milliseconds_with_its_own_number():
+    with can_rig() as rig, rig.transport:
+        rig.run(1.0)
+        messages = Parser().feed(b"".join(bytes(frame.data) for frame in rig.sent()))
+        beats = [message for message in messages if message.cmdid == 0x60]
+        assert len(beats) == rig.transport.heartbeats == 101
+        # The work mode runs between the same two hosts and took number 0.
+        assert [beat.sequence for beat in beats] == list(range(1, 102))
+        assert rig.node.heartbeats >= 99
+
+
+def test_missed_heartbeats_are_skipped_and_counted_and_the_schedule_stays():
+    with can_rig() as rig, rig.transport:
+        transport = rig.transport
+        for now_s in (5.0, 5.004, 5.057, 5.059, 5.061):
+            transport.service(now_s)
+        assert transport.heartbeats == 3
+        assert transport.missed_heartbeats == 4
+
+
+def test_telemetry_comes_back_in_rep_103_with_both_times():
+    with can_rig() as rig, rig.transport:
+        assert rig.transport.telemetry is None
+        for _ in range(50):
+            rig.transport.send(BodyVelocity(0.25, 0.5, 0.5))
+            rig.run(0.02)
+        told = rig.transport.telemetry
+        # The node is polled before the transport is served, at the same instants.
+        assert told.received_s == pytest.approx(told.robot_time_s, abs=1e-6)
+        assert rig.clock.now() - told.robot_time_s <= 0.02
+        assert told.velocity_body_mps == (0.25, 0.5)
+        assert told.heading_rad == pytest.approx(rig.plant.heading_rad, abs=0.02)
+        assert told.position_xy_m == pytest.approx(rig.plant.position_xy_m, abs=0.02)
+        cosine, sine = math.cos(told.heading_rad), math.sin(told.heading_rad)
+        assert told.velocity_start_mps == pytest.approx((0.25 * cosine - 0.5 * sine, 0.25 * sine + 0.5 * cosine))
+        assert rig.transport.refusals == 0
+        assert rig.transport.malformed_pushes == 0
+
+
+def test_a_bus_error_in_send_is_one_sentence_and_counted():
+    bus = BrokenBus({OPENING_FRAMES + 1})
+    transport = RoboMasterCan(bus)
+    transport.open()
+    with pytest.raises(MtmError, match=r"refused a frame \(bus off"):
+        transport.send(FORWARD)
+    assert transport.bus_errors == 1
+    transport.send(FORWARD)
+
+
+def test_stop_tries_again_until_both_commands_are_out():
+    bus = BrokenBus({OPENING_FRAMES + number for number in (1, 3, 8)})
+    transport = RoboMasterCan(bus)
+    transport.open()
+    del bus.kept[:]
+    transport.stop()
+    assert commands(bus.kept) == RELEASE
+    assert transport.bus_errors == 3
+
+
+def test_a_stop_that_cannot_be_sent_says_so_after_a_few_tries_and_the_bus_is_still_released():
+    bus = BrokenBus(range(OPENING_FRAMES + 1, 10_000))
+    with pytest.raises(MtmError, match="switch the robot off"), RoboMasterCan(bus):
+        pass
+    assert bus.tried == OPENING_FRAMES + 10
+    assert bus.is_shut_down
+
+
+def test_an_opening_that_fails_half_way_releases_the_motors_and_the_bus():
+    bus = BrokenBus({OPENING_FRAMES})
+    with pytest.raises(MtmError, match="refused a frame"):
+        RoboMasterCan(bus).open()
+    assert commands(bus.kept)[-2:] == RELEASE
+    assert bus.is_shut_down
+
+
+def test_a_bus_error_in_a_heartbeat_is_counted_and_does_not_end_the_service():
+    bus = BrokenBus({OPENING_FRAMES + 1})
+    transport = RoboMasterCan(bus)
+    transport.open()
+    transport.service(0.0)
+    transport.service(0.01)
+    assert (transport.bus_errors, transport.heartbeats) == (1, 1)
+
+
+def test_a_service_after_close_does_nothing():
+    bus = BrokenBus(())
+    transport = RoboMasterCan(bus)
+    with transport:
+        pass
+    tried = bus.tried
+    transport.service(0.0)
+    assert bus.tried == tried
+
+
+def test_a_given_bus_serves_for_one_opening():
+    transport = RoboMasterCan(BrokenBus(()))
+    with transport:
+        pass
+    with pytest.raises(MtmError, match="make a new transport"):
+        transport.open()
+
+
+def test_a_bus_that_cannot_be_opened_is_one_sentence():
+    with pytest.raises(MtmError, match="check the interface and the channel"):
+        RoboMasterCan(interface="there-is-no-such-interface", channel="0").open()
+
+
+@pytest.mark.parametrize("arguments", [{}, {"bus": BrokenBus(()), "channel": "can0"}])
+def test_a_link_needs_either_a_bus_or_its_options(arguments):
+    with pytest.raises(MtmError, match="one of the two"):
+        RoboMasterCan(**arguments)
+
+
+def test_commands_and_heartbeats_from_two_threads_never_mix_their_frames():
+    with can_rig() as rig, rig.transport:
+        beating = threading.Thread(target=lambda: [rig.transport.service(0.01 * beat) for beat in range(300)])
+        beating.start()
+        for _ in range(300):
+            rig.transport.send(FORWARD)
+        beating.join()
+        parser = Parser()
+        messages = parser.feed(b"".join(bytes(frame.data) for frame in rig.sent()))
+        assert len(messages) == 5 + 300 + 300
+        assert parser.dropped_bytes == 0
+
+
+@pytest.mark.parametrize(("code", "refusals"), [(b"\x00", 0), (b"\x01", 1), (b"", 1)])
+def test_an_answer_with_an_error_code_is_counted(code, refusals):
+    with can_rig() as rig, rig.transport:
+        answer = WORK_MODE.message(3, b"\x01").answer(code)
+        for data in segment(encode(answer)):
+            rig.tap.send(can.Message(arbitration_id=0x202, is_extended_id=False, data=data))
+        rig.transport.service(0.0)
+        assert rig.transport.refusals == refusals
+
+
+def test_a_robot_that_hears_nothing_more_is_stopped_by_its_own_deadman():
+    with can_rig(deadman_s=0.2) as rig, rig.transport:
+        rig.transport.send(FORWARD)
+        rig.run(0.1)
+        assert rig.plant.velocity_body == FORWARD
+        rig.run(0.2)
+        assert rig.plant.velocity_body == STOP
