@@ -28,6 +28,9 @@ lint: setup
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy --no-error-summary
 
+firmware: setup
+	$(MAKE) -C firmware_shim
+
 bench: setup
 	$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-only -s
 

@@ -6,7 +6,12 @@ from collections.abc import Sequence
 from importlib import import_module
 
 # Each module has `add_parser(subparsers)`, which sets `handler(args) -> int`, and imports what it needs only in there.
-_COMMANDS = ("mtm_onboard.commands.keygen", "mtm_onboard.commands.show", "mtm_onboard.commands.run")
+_COMMANDS = (
+    "mtm_onboard.commands.keygen",
+    "mtm_onboard.commands.show",
+    "mtm_onboard.commands.run",
+    "mtm_onboard.export",
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,0 +1,92 @@
+"""`mtm-onboard export`: a message as the image that a microcontroller plays."""
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mtm_onboard.protocol import Channel, Scheme
+
+# DJI's limits for the chassis; others are options.
+_SPEED_MPS = 3.5
+_TURN_RATE_RADPS = 10.47
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command and its options."""
+    parser = subparsers.add_parser("export", help="write a message as an image for firmware_shim")
+    parser.add_argument("--key", required=True, type=Path, help="the key file")
+    parser.add_argument("--channel", help="the scheme's channel that the robot plays; may be left out if there is one")
+    message = parser.add_mutually_exclusive_group(required=True)
+    message.add_argument("--message", type=int, metavar="N", help="the message as a number")
+    message.add_argument("--symbols", type=_symbols, metavar="S,S,...", help="the whole message as symbols")
+    parser.add_argument("-o", "--out", required=True, type=Path, help="the image to write; it replaces an older one")
+    parser.add_argument("--no-repeat", action="store_true", help="fixed schedule: play the message once")
+    length = parser.add_mutually_exclusive_group()
+    length.add_argument("--messages", type=int, metavar="N", help="rolling schedule: how many messages (1)")
+    length.add_argument("--span", type=float, metavar="S", help="rolling schedule: messages for at least this long")
+    parser.add_argument(
+        "--first-message", type=int, metavar="N", default=0, help="rolling schedule: number of the first"
+    )
+    parser.add_argument("--limit-mps", type=float, default=_SPEED_MPS, help="largest |vx| and |vy| sent (%(default)s)")
+    parser.add_argument("--limit-radps", type=float, default=_TURN_RATE_RADPS, help="largest |wz| sent (%(default)s)")
+    parser.set_defaults(handler=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the image with mode 0600: it holds no secret, but whoever has it can play the message."""
+    from mtm_onboard.image import channel_image, image_bytes, tagged
+    from mtm_onboard.protocol import load_key
+    from mtm_onboard.protocol.atomicfile import replacing
+    from mtm_onboard.protocol.framing import channel_symbols, check_symbols, symbols_of_number
+
+    key = load_key(args.key)
+    scheme = key.scheme
+    channel = _channel(scheme, args.channel)
+    whole = symbols_of_number(args.message, scheme) if args.symbols is None else check_symbols(args.symbols, scheme)
+    image = channel_image(
+        key.codebook(),
+        channel.name,
+        channel_symbols(whole, scheme)[channel.name],
+        limits=(args.limit_mps, args.limit_mps, args.limit_radps),
+        repeat=not args.no_repeat,
+        first_message=args.first_message,
+        messages=_messages(args, scheme),
+    )
+    data = image_bytes(tagged(image, key.secret))
+    with replacing(args.out, mode=0o600) as temporary:
+        temporary.write_bytes(data)
+    seconds = image.samples.shape[1] / scheme.rate_hz
+    ending = "again and again" if image.repeats else "once"
+    print(
+        f"wrote {args.out}: {len(data)} bytes, channel {channel.name}, {image.messages} message(s) in {seconds:g} s, "
+        f"{ending}, {scheme.rate_hz:g} Hz, scheme {scheme.fingerprint}"
+    )
+    return 0
+
+
+def _channel(scheme: "Scheme", name: str | None) -> "Channel":
+    from mtm_onboard.protocol import MtmError
+
+    if name is not None:
+        return scheme.channel(name)
+    if len(scheme.channels) > 1:
+        names = ", ".join(channel.name for channel in scheme.channels)
+        raise MtmError(f"the scheme has several channels; say with --channel which the robot plays: {names}")
+    return scheme.channels[0]
+
+
+def _messages(args: argparse.Namespace, scheme: "Scheme") -> int:
+    from mtm_onboard.protocol import MtmError
+
+    if args.span is None:
+        return 1 if args.messages is None else int(args.messages)
+    if not (math.isfinite(args.span) and args.span > 0):
+        raise MtmError(f"the span is {args.span} s; give a number above zero")
+    messages: int = math.ceil(args.span * scheme.rate_hz / scheme.message_ticks)
+    return messages
+
+
+def _symbols(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split(","))
