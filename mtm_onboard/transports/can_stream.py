@@ -1,5 +1,6 @@
 """DJI's messages over a CAN bus, where each CAN id is one stream of bytes."""
 
+import select
 from typing import TYPE_CHECKING, Protocol
 
 from mtm_onboard.protocol.errors import MtmError
@@ -44,7 +45,8 @@ class CanStream:
         self._send_id = send_id
         self._receive_id = receive_id
         self._frame = can.Message
-        self._errors = (can.CanError, OSError)
+        self._errors = (can.CanError, OSError, ValueError)  # ValueError: the descriptor of a closed bus
+        self._descriptor = _descriptor(bus)
 
     def write(self, message: Message) -> None:
         """Put one message on the bus; raises MtmError when the bus refuses a frame of it."""
@@ -60,10 +62,13 @@ class CanStream:
         data = bytearray()
         try:
             for _ in range(_MOST_FRAMES_A_READ):
+                if self._is_quiet():
+                    break
                 frame = self._bus.recv(0)
                 if frame is None:
-                    break
-                if frame.arbitration_id == self._receive_id and not (frame.is_extended_id or frame.is_error_frame):
+                    if self._descriptor is None:
+                        break
+                elif frame.arbitration_id == self._receive_id and not (frame.is_extended_id or frame.is_error_frame):
                     data += frame.data
         except self._errors as error:
             raise MtmError(f"The CAN bus cannot be read ({error}); check the wiring and the robot's power.") from error
@@ -72,3 +77,19 @@ class CanStream:
     def shutdown(self) -> None:
         """Release the bus."""
         self._bus.shutdown()
+
+    def _is_quiet(self) -> bool:
+        """Whether nothing waits behind the bus's file descriptor; False when it has none.
+
+        A serial adapter's `recv(0)` waits a millisecond when there is nothing, and gives None for an adapter's own
+        reply although frames wait behind it. The descriptor knows better.
+        """
+        return self._descriptor is not None and not select.select([self._descriptor], (), (), 0)[0]
+
+
+def _descriptor(bus: Bus) -> int | None:
+    try:
+        descriptor = int(bus.fileno())  # type: ignore[attr-defined]
+    except (AttributeError, NotImplementedError):
+        return None
+    return descriptor if descriptor >= 0 else None
