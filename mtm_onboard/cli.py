@@ -10,7 +10,7 @@ _COMMANDS = (
     "mtm_onboard.commands.keygen",
     "mtm_onboard.commands.show",
     "mtm_onboard.commands.run",
-    "mtm_onboard.export",
+    "mtm_onboard.commands.export",
 )
 
 

@@ -16,6 +16,9 @@ STOPPED = 4
 CLAMPED = 8
 REFUSED = 16
 
+# Instants are sums of decimal fractions, so an age that is within this of a bound has reached it.
+_HAIR_S = 1e-9
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -101,7 +104,7 @@ class Guard:
         else:
             self.refused += 1
             self.flags = REFUSED
-        age_s = now_s - self._arrived_s
+        age_s = now_s - self._arrived_s + _HAIR_S
         vx_mps, vy_mps, wz_radps = self._base
         kept = 1.0
         if not age_s < self._noise_off_s:

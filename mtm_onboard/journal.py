@@ -70,12 +70,13 @@ class JournalRecord:
 class Journal:
     """Writes one file; `threaded` hands the writing to a thread, as real time needs, and else `append` does it.
 
-    An existing file is kept: the new one gets the next free number before its suffix, see `path`. `lost` counts
-    rows that could not be kept or written. Raises MtmError when the file cannot be opened.
+    An existing file is kept: the new one gets the next free number before its suffix, see `path`.
+    Raises MtmError when the file cannot be opened.
     """
 
     def __init__(self, path: Path, header: JournalHeader, *, threaded: bool) -> None:
-        self.lost = 0
+        # Two counts, since two threads count.
+        self._overrun = self._unwritten = 0
         self._header = header
         self._waiting: deque[_Row] = deque()
         self._torn = False
@@ -86,11 +87,16 @@ class Journal:
         if self._thread is not None:
             self._thread.start()
 
+    @property
+    def lost(self) -> int:
+        """Rows that found the queue full or could not be written."""
+        return self._overrun + self._unwritten
+
     def append(self, tick: int, now_s: float, base: BodyVelocity, sent: BodyVelocity, flags: int) -> None:
         """Keep one tick for writing; a row that finds the queue full is lost and counted."""
         waiting = self._waiting
         if len(waiting) >= _MOST_WAITING:
-            self.lost += 1
+            self._overrun += 1
             return
         waiting.append((tick, now_s, base, sent, flags))
         if self._thread is None and len(waiting) >= _INLINE_BATCH:
@@ -134,7 +140,7 @@ class Journal:
         except OSError:
             done = 0
         written = max(0, done - len(begun))
-        self.lost += text[written:].count(b"\n")
+        self._unwritten += text[written:].count(b"\n")
         self._torn = done < len(begun + text) and (self._torn or done > 0)
 
 

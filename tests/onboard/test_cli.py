@@ -1,0 +1,236 @@
+import os
+import re
+import select
+import signal
+import stat
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mtm_onboard.cli import main
+from mtm_onboard.client import BaseCommandClient
+from mtm_onboard.guard import NOISE
+from mtm_onboard.journal import read_journal
+from mtm_onboard.modulator import Modulator
+from mtm_onboard.motion import BodyVelocity
+from mtm_onboard.protocol import load_key
+from mtm_onboard.protocol.framing import symbols_of_number
+
+CONFIG = """
+[robot]
+name = "robot0"
+channel = "robot1"
+[transport]
+kind = "none"
+[limits]
+speed_mps = 1.0
+turn_rate_radps = 2.0
+[source]
+kind = "udp"
+port = {port}
+[journal]
+path = "{journal}"
+"""
+
+
+def keygen(path: Path, *options: str) -> int:
+    return main(["keygen", "--id", "fake-key", "--out", str(path), *options])
+
+
+@pytest.fixture
+def key(tmp_path):
+    assert keygen(tmp_path / "robot.key", "--preset", "robomaster-fleet") == 0
+    return tmp_path / "robot.key"
+
+
+def configure(folder: Path, port: int = 47_001) -> Path:
+    (folder / "robot.toml").write_text(CONFIG.format(port=port, journal=folder / "journal.csv"))
+    return folder / "robot.toml"
+
+
+def run(folder: Path, *options: str) -> int:
+    return main(["run", "--config", str(folder / "robot.toml"), "--key", str(folder / "robot.key"), *options])
+
+
+def start(folder: Path, *options: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-c", "import sys; from mtm_onboard.cli import main; sys.exit(main())", "run"]
+    files = ["--config", str(folder / "robot.toml"), "--key", str(folder / "robot.key")]
+    return subprocess.Popen(
+        [*command, *files, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+
+
+def test_the_fleet_preset_is_the_documented_scheme(key):
+    scheme = load_key(key).scheme
+    assert (scheme.rate_hz, scheme.band_hz, scheme.alphabet_size, scheme.message_ticks) == (50.0, (0.5, 5.0), 4, 600)
+    assert [(each.name, each.body, each.axes, each.symbols, each.sigma) for each in scheme.channels] == [
+        (name, name, ("vx", "vy"), 1, 0.1) for name in ("robot0", "robot1", "robot2", "robot3")
+    ]
+    assert (scheme.combine, scheme.power, scheme.schedule) == ("split", "window", "fixed")
+    assert stat.S_IMODE(key.stat().st_mode) == 0o600
+
+
+def test_every_parameter_can_be_chosen(tmp_path):
+    code = keygen(
+        tmp_path / "a.key", "--name", "arms", "--rate", "20", "--band", "0.5:4", "--alphabet", "8",
+        "--message-ticks", "400", "--channel", "inner:shoulder,elbow:2:0.3:arm", "--channel", "base:vx:2:0.1",
+        "--combine", "same", "--power", "ensemble", "--schedule", "rolling",
+    )  # fmt: skip
+    scheme = load_key(tmp_path / "a.key").scheme
+    assert code == 0
+    assert scheme.channels[0].body == "arm"
+    assert scheme.channels[0].axes == ("shoulder", "elbow")
+    assert (scheme.name, scheme.rate_hz, scheme.band_hz, scheme.message_symbols) == ("arms", 20.0, (0.5, 4.0), 2)
+    assert (scheme.combine, scheme.power, scheme.schedule) == ("same", "ensemble", "rolling")
+
+
+def test_an_option_overrides_its_part_of_a_preset(tmp_path):
+    assert keygen(tmp_path / "a.key", "--preset", "robomaster-fleet", "--alphabet", "16") == 0
+    assert load_key(tmp_path / "a.key").scheme.alphabet_size == 16
+
+
+def test_show_tells_the_scheme_and_never_the_secret(key, capsys):
+    assert main(["show", "--key", str(key)]) == 0
+    shown = capsys.readouterr().out
+    for fact in (load_key(key).scheme.fingerprint, "fake-key", "600 ticks, 12 s, 4 symbols, 8 bits", "55 tones"):
+        assert fact in shown
+    assert load_key(key).secret.hex() not in shown
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--preset", "robomaster-fleet", "--band", "0.5:30"], "lower band_hz or raise rate_hz"),
+        (["--preset", "robomaster-fleet", "--channel", "robot0"], "NAME:AXES:SYMBOLS:SIGMA"),
+        (["--preset", "robomaster-fleet", "--schedule", "weekly"], "choose one of: fixed, rolling"),
+    ],
+)
+def test_a_scheme_that_cannot_be_is_an_error_of_one_sentence(tmp_path, capsys, options, sentence):
+    assert keygen(tmp_path / "a.key", *options) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("mtm-onboard: ")
+    assert error.count("\n") == 1
+    assert sentence in error
+    assert not (tmp_path / "a.key").exists()
+
+
+def test_a_key_is_never_overwritten(key, capsys):
+    before = key.read_bytes()
+    assert keygen(key, "--preset", "robomaster-fleet") == 1
+    assert key.read_bytes() == before
+    assert "exists already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [], ["fly"], ["keygen", "--id", "a", "--out", "b"], ["run", "--config", "a", "--key", "b"],
+        ["run", "--config", "a", "--key", "b", "--message", "1", "--no-message"],
+        ["run", "--config", "a", "--key", "b", "--message", "1", "--duration", "-1"],
+        ["run", "--config", "a", "--key", "b", "--symbols", "one"],
+    ],
+)  # fmt: skip
+def test_wrong_usage_leaves_with_two(arguments, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 2
+    assert "usage" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [(["--message", "256"], "does not fit"), (["--symbols", "0,1"], "has 4"), (["--symbols", "0,1,2,4"], "alphabet")],
+)
+def test_a_message_that_does_not_fit_is_refused(tmp_path, key, capsys, options, sentence):
+    configure(tmp_path)
+    assert run(tmp_path, *options) == 1
+    assert sentence in capsys.readouterr().err
+
+
+def test_a_run_to_a_message_s_end_sends_it_and_says_so(tmp_path, key, capsys):
+    configure(tmp_path)
+    assert run(tmp_path, "--message", "99", "--duration", "0.1") == 0
+    assert re.fullmatch(
+        r"\d+ ticks sent, \d+ missed, 0 clamped, \d+ stale, 0 commands refused, late p50 [\d.]+ ms p99 [\d.]+ ms, "
+        r"journal .*journal.csv, 0 rows lost\n",
+        capsys.readouterr().out,
+    )
+    header = read_journal(tmp_path / "journal.csv").header
+    loaded = load_key(key)
+    assert (header.key_id, header.fingerprint) == ("fake-key", loaded.scheme.fingerprint)
+    assert header.symbols == symbols_of_number(99, loaded.scheme)
+    assert loaded.secret.hex() not in (tmp_path / "journal.csv").read_text()
+
+
+def test_robots_that_are_told_the_same_start_share_it_and_one_that_comes_late_joins_in_the_middle(tmp_path, key):
+    configure(tmp_path)
+    started = time.time() - 5.0
+    assert run(tmp_path, "--message", "99", "--start-at", str(started), "--duration", "6") == 0
+    record = read_journal(tmp_path / "journal.csv")
+    assert record.header.start_unix_s == pytest.approx(started)
+    assert 250 <= record.ticks[0] < 300
+
+
+@pytest.mark.realtime
+def test_lines_on_standard_input_become_motion_with_the_message_on_it(tmp_path, key):
+    configure(tmp_path)
+    process = start(tmp_path, "--symbols", "3,1,0,2", "--stdin")
+    assert process.stdin is not None
+    while process.poll() is None and not noisy_ticks(tmp_path):
+        process.stdin.write(b"v 0.2 0 0.1\n")
+        process.stdin.flush()
+        select.select([], [], [], 0.02)
+    process.send_signal(signal.SIGTERM)
+    out, error = process.communicate(timeout=20)
+    assert (process.returncode, error) == (0, b"")
+    assert out.count(b"\n") == 1
+    assert noisy_ticks(tmp_path) > 0
+    record = read_journal(tmp_path / "journal.csv")
+    noisy = record.flags == NOISE
+    own = Modulator(load_key(key).codebook(), "robot1", (1,))
+    base = BodyVelocity(0.2, 0.0, 0.1)
+    assert record.sent[noisy] == pytest.approx(np.array([own.add(tick, base) for tick in record.ticks[noisy].tolist()]))
+
+
+def noisy_ticks(folder: Path) -> int:
+    path = folder / "journal.csv"
+    # The first look may come before the header is written.
+    if not path.exists() or path.read_text().count("\n") < 3:
+        return 0
+    return int(np.count_nonzero(read_journal(path).flags == NOISE))
+
+
+@pytest.mark.realtime
+def test_an_interrupt_ends_a_run_on_a_controller_s_commands_with_nothing_wrong(tmp_path, key):
+    port = 40_000 + os.getpid() % 20_000
+    configure(tmp_path, port)
+    process = start(tmp_path, "--no-message")
+    client = BaseCommandClient(port)
+    journal = tmp_path / "journal.csv"
+    while process.poll() is None and (not journal.exists() or b",0.2,0," not in journal.read_bytes()):
+        client.send(BodyVelocity(0.2, 0.0, 0.1))
+        select.select([], [], [], 0.02)
+    process.send_signal(signal.SIGINT)
+    out, error = process.communicate(timeout=20)
+    client.close()
+    assert (process.returncode, error) == (0, b"")
+    assert b"ticks sent" in out
+    assert not np.any(read_journal(journal).flags & NOISE)
+
+
+def test_a_journal_that_cannot_be_written_is_an_error(tmp_path, key, capsys):
+    configure(tmp_path)
+    (tmp_path / "robot.toml").write_text((tmp_path / "robot.toml").read_text().replace("journal.csv", "no/journal.csv"))
+    assert run(tmp_path, "--no-message", "--stdin", "--duration", "0") == 1
+    assert "cannot write the journal" in capsys.readouterr().err
+
+
+def test_help_takes_neither_numpy_nor_long():
+    code = "import sys; from mtm_onboard.cli import main\ntry: main(['--help'])\nfinally: print('numpy' in sys.modules)"
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert "keygen" in shown
+    assert shown.endswith("False\n")
