@@ -12,7 +12,8 @@ class DirectTransport(Transport):
     """Hands each command to `controller` after the 32-bit round trip of a RoboMaster speed message.
 
     The motion is the same bit for bit as over the simulated CAN bus with the controller advanced at the same instants.
-    `clock` says when a command arrives.
+    `clock` says when a command arrives; the deadman counts from there, over the bus from the poll that reads it. Use it
+    from one thread.
     """
 
     def __init__(self, controller: MotionController, clock: Clock) -> None:

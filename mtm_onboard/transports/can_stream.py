@@ -50,8 +50,9 @@ class CanStream:
 
     def write(self, message: Message) -> None:
         """Put one message on the bus; raises MtmError when the bus refuses a frame of it."""
+        parts = segment(encode(message))
         try:
-            for data in segment(encode(message)):
+            for data in parts:
                 frame = self._frame(arbitration_id=self._send_id, is_extended_id=False, data=data)
                 self._bus.send(frame, timeout=_SEND_TIMEOUT_S)
         except self._errors as error:

@@ -92,6 +92,8 @@ class RoboMasterCan(Transport):
         with self._lock:
             if self._stream is None:
                 self._stream = CanStream(self._opened_bus(), FROM_COMPANION_ID, FROM_MOTION_CONTROLLER_ID)
+                self._first_beat_s = None
+                self._last_beat = -1
             self._engaged = True
         try:
             self._command(UNSUBSCRIBE, unsubscription_payload(SUBSCRIPTION.stream))
@@ -140,13 +142,13 @@ class RoboMasterCan(Transport):
 
     def service(self, now_s: float) -> None:
         """Send the heartbeat that is due at `now_s`, never more than one, and read what the robot has pushed."""
-        if self._first_beat_s is None:
-            self._first_beat_s = now_s
-        beat = int((now_s - self._first_beat_s) / HEARTBEAT_PERIOD_S + _BEAT_SLACK)
         with self._lock:
             stream = self._stream
             if stream is None:
                 return
+            if self._first_beat_s is None:
+                self._first_beat_s = now_s
+            beat = int((now_s - self._first_beat_s) / HEARTBEAT_PERIOD_S + _BEAT_SLACK)
             if beat > self._last_beat:
                 self.missed_heartbeats += beat - self._last_beat - 1
                 self._last_beat = beat
@@ -165,7 +167,7 @@ class RoboMasterCan(Transport):
             raise MtmError("python-can is not installed; install mtm[can] to reach a robot over CAN.") from None
         try:
             return can.Bus(**{"bitrate": BITRATE, **self._bus_options})
-        except (can.CanError, OSError, ValueError) as error:
+        except (can.CanError, OSError, ValueError, TypeError) as error:
             raise MtmError(f"The CAN bus cannot be opened ({error}); check the interface and the channel.") from error
 
     def _command(self, kind: Kind, payload: bytes) -> None:

@@ -97,6 +97,17 @@ def test_missed_heartbeats_are_skipped_and_counted_and_the_schedule_stays():
         assert transport.missed_heartbeats == 4
 
 
+def test_time_without_a_link_counts_no_missed_heartbeats():
+    with can_rig() as rig:
+        rig.run(1.0)
+        for _ in range(2):
+            with rig.transport:
+                rig.run(0.1)
+            rig.run(1.0)
+        assert rig.transport.heartbeats == 2 * 10
+        assert rig.transport.missed_heartbeats == 0
+
+
 def test_telemetry_comes_back_in_rep_103_with_both_times():
     with can_rig() as rig, rig.transport:
         assert rig.transport.telemetry is None
