@@ -20,6 +20,8 @@ from mtm_onboard.motion import BodyVelocity
 from mtm_onboard.protocol import load_key
 from mtm_onboard.protocol.framing import symbols_of_number
 
+# Its own for each test process, so that two at once on one machine do not meet.
+PORT = 40_000 + os.getpid() % 20_000
 CONFIG = """
 [robot]
 name = "robot0"
@@ -47,9 +49,8 @@ def key(tmp_path):
     return tmp_path / "robot.key"
 
 
-def configure(folder: Path, port: int = 47_001) -> Path:
-    (folder / "robot.toml").write_text(CONFIG.format(port=port, journal=folder / "journal.csv"))
-    return folder / "robot.toml"
+def configure(folder: Path) -> None:
+    (folder / "robot.toml").write_text(CONFIG.format(port=PORT, journal=folder / "journal.csv"))
 
 
 def run(folder: Path, *options: str) -> int:
@@ -206,10 +207,9 @@ def noisy_ticks(folder: Path) -> int:
 
 @pytest.mark.realtime
 def test_an_interrupt_ends_a_run_on_a_controller_s_commands_with_nothing_wrong(tmp_path, key):
-    port = 40_000 + os.getpid() % 20_000
-    configure(tmp_path, port)
+    configure(tmp_path)
     process = start(tmp_path, "--no-message")
-    client = BaseCommandClient(port)
+    client = BaseCommandClient(PORT)
     journal = tmp_path / "journal.csv"
     while process.poll() is None and (not journal.exists() or b",0.2,0," not in journal.read_bytes()):
         client.send(BodyVelocity(0.2, 0.0, 0.1))

@@ -1,0 +1,122 @@
+"""One run of a robot in real time: everything put together, from opening its link to its last stop."""
+
+import gc
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from mtm_onboard.clock import SystemClock
+from mtm_onboard.config import RobotConfig, SourceSettings
+from mtm_onboard.guard import Guard
+from mtm_onboard.journal import Journal, JournalHeader
+from mtm_onboard.loop import LoopStats, run_loop
+from mtm_onboard.modulator import Modulator
+from mtm_onboard.protocol import Key, MtmError
+from mtm_onboard.protocol.framing import channel_symbols
+from mtm_onboard.runtime import Runtime
+from mtm_onboard.service import ServiceThread
+from mtm_onboard.source import Source, StdinSource, UdpSource
+from mtm_onboard.transports.factory import make_transport
+
+# Between opening the link and the message's first tick, so that the loop is running by then.
+_LEAD_S = 0.1
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to send and when: the whole message (None: base commands alone), from `start_unix_s` (None: at once) on.
+
+    The run ends `duration_s` after the message's start; without `repeat` the message is sent once.
+    """
+
+    message: tuple[int, ...] | None
+    repeat: bool = True
+    start_unix_s: float | None = None
+    duration_s: float = math.inf
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the run did. `journal` is None when none was kept."""
+
+    stats: LoopStats
+    guard: Guard
+    source: Source
+    journal: Journal | None
+
+    def summary(self) -> str:
+        """All of it in one line."""
+        guard, late_ms = self.guard, [1e3 * self.stats.lateness.quantile_s(part) for part in (0.5, 0.99)]
+        kept = f", journal {self.journal.path}, {self.journal.lost} rows lost" if self.journal else ""
+        return (
+            f"{self.stats.sent} ticks sent, {self.stats.missed} missed, {guard.clamped} clamped, {guard.stale} stale, "
+            f"{self.source.refused + guard.refused} commands refused, "
+            f"late p50 {late_ms[0]:.3f} ms p99 {late_ms[1]:.3f} ms{kept}"
+        )
+
+
+def run_session(config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callable[[], bool]) -> Outcome:
+    """Drive the robot until `asked_to_end()` or the plan's end; leaving it, in whatever way, stops the robot.
+
+    Raises MtmError when the plan does not fit the key, and when the link or the journal cannot be had or the link
+    fails.
+    """
+    channel, rate_hz = key.scheme.channel(config.robot.channel), key.scheme.rate_hz
+    modulator = _modulator(key, channel.name, plan)
+    guard = Guard(config.limits, config.staleness, noise_sigma=channel.sigma, period_s=1 / rate_hz)
+    clock, stats = SystemClock(), LoopStats()
+    transport = make_transport(config.transport_kind, config.transport_options)
+    # The stack closes in reverse: the robot is told to stop before a socket or a slow disk is waited for.
+    with ExitStack() as stack:
+        source = _source(config.source)
+        stack.callback(source.close)
+        files = stack.enter_context(ExitStack())
+        stack.enter_context(transport)
+        service = stack.enter_context(ServiceThread(transport, clock))
+        now_s, now_unix_s = clock.now(), time.time()
+        start_unix_s = now_unix_s + _LEAD_S if plan.start_unix_s is None else plan.start_unix_s
+        start_s = now_s + start_unix_s - now_unix_s
+        journal = None
+        if config.journal is not None:
+            header = JournalHeader(
+                fingerprint=key.scheme.fingerprint, key_id=key.id, robot=config.robot.name, channel=channel.name,
+                symbols=plan.message, repeat=plan.repeat, rate_hz=rate_hz, start_s=start_s, start_unix_s=start_unix_s,
+            )  # fmt: skip
+            journal = files.enter_context(Journal(Path(config.journal.path), header, threaded=True))
+        runtime = Runtime(modulator, guard, source, transport, journal)
+
+        def ending() -> bool:
+            return asked_to_end() or service.error is not None or clock.now() >= start_s + plan.duration_s
+
+        with _long_lived_objects_uncollected():
+            run_loop(clock, rate_hz, runtime.step, start_s=start_s, stop=ending, stats=stats)
+        if service.error is not None:
+            raise MtmError(f"the robot's link failed ({service.error}); check the link") from service.error
+    return Outcome(stats, guard, source, journal)
+
+
+def _modulator(key: Key, channel_name: str, plan: Plan) -> Modulator | None:
+    if plan.message is None:
+        return None
+    own = channel_symbols(plan.message, key.scheme)[channel_name]
+    modulator = Modulator(key.codebook(), channel_name, own, repeat=plan.repeat)
+    modulator.require_body_axes()
+    return modulator
+
+
+def _source(settings: SourceSettings) -> Source:
+    return StdinSource() if settings.port is None else UdpSource(settings.port)
+
+
+@contextmanager
+def _long_lived_objects_uncollected() -> Iterator[None]:
+    """Keep what is alive now out of later garbage collections, so that none of them takes milliseconds of a tick."""
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()

@@ -1,0 +1,128 @@
+import math
+import threading
+from dataclasses import replace
+from itertools import count
+
+import pytest
+
+from mtm_onboard.config import RobotConfig, config_from_table
+from mtm_onboard.motion import STOP, BodyVelocity
+from mtm_onboard.protocol import Channel, Key, MtmError
+from mtm_onboard.session import Plan, run_session
+from mtm_onboard.transports.none import NullTransport
+from tests.onboard.schemes import FAKE_SECRET, small_scheme
+
+KEY = Key("fake-key", FAKE_SECRET, small_scheme())
+
+
+class Link(NullTransport):
+    """Fails where it is told to, and keeps what happened in order."""
+
+    def __init__(self, failing: str = "", failing_from: int = 2) -> None:
+        super().__init__()
+        self.events: list[str] = []
+        self._failing = failing
+        self._failing_from = failing_from
+        self._served = count(1)
+
+    def open(self) -> None:
+        self.events.append("open")
+        if self._failing == "open":
+            raise MtmError("cannot open the link; plug it in")
+
+    def send(self, velocity: BodyVelocity) -> None:
+        super().send(velocity)
+        if self._failing == "send" and self.sent >= self._failing_from:
+            raise OSError("cable pulled")
+
+    def service(self, now_s: float) -> None:
+        if self._failing == "service" and next(self._served) >= self._failing_from:
+            raise OSError("no heartbeat")
+
+    def stop(self) -> None:
+        self.events.append("stop")
+
+    def close(self) -> None:
+        self.events.append("close")
+
+
+@pytest.fixture
+def config() -> RobotConfig:
+    return config_from_table(
+        {
+            "robot": {"name": "r", "channel": "a"},
+            "transport": {"kind": "none"},
+            "limits": {"speed_mps": 1.0, "turn_rate_radps": 2.0},
+            "source": {"kind": "stdin"},
+        }
+    )
+
+
+@pytest.fixture
+def use(monkeypatch):
+    monkeypatch.setattr("mtm_onboard.session.StdinSource", Silence)
+
+    def patch(link: Link) -> Link:
+        monkeypatch.setattr("mtm_onboard.session.make_transport", lambda kind, options: link)
+        return link
+
+    return patch
+
+
+class Silence:
+    """A source that no command ever comes from."""
+
+    refused = 0
+
+    def poll(self, now_s: float) -> tuple[BodyVelocity, float, bool]:
+        return STOP, -math.inf, False
+
+    def close(self) -> None:
+        pass
+
+
+def never() -> bool:
+    return False
+
+
+def test_a_run_opens_the_link_and_leaves_it_stopped_and_closed(config, use):
+    link = use(Link())
+    outcome = run_session(config, KEY, Plan((0, 1, 2, 3), duration_s=0.0), never)
+    assert link.events == ["open", "stop", "close"]
+    assert link.sent == outcome.stats.sent
+    assert "ticks sent" in outcome.summary()
+    assert "journal" not in outcome.summary()
+
+
+def test_a_run_that_is_asked_to_end_at_once_sends_nothing_but_the_stop(config, use):
+    link = use(Link())
+    assert run_session(config, KEY, Plan(None), lambda: True).stats.sent == 0
+    assert link.events == ["open", "stop", "close"]
+
+
+@pytest.mark.parametrize(("failing", "sentence"), [("send", "cable pulled"), ("service", "no heartbeat")])
+def test_a_link_that_fails_on_the_way_stops_the_robot_and_is_an_error(config, use, failing, sentence):
+    link = use(Link(failing))
+    with pytest.raises(MtmError, match=sentence):
+        run_session(config, KEY, Plan((0, 1, 2, 3)), never)
+    assert link.events[0] == "open"
+    assert link.events[-2:] == ["stop", "close"]
+    assert "service" not in {thread.name for thread in threading.enumerate()}
+
+
+def test_a_link_that_does_not_open_is_an_error(config, use):
+    link = use(Link("open"))
+    with pytest.raises(MtmError, match="plug it in"):
+        run_session(config, KEY, Plan(None), never)
+    assert link.sent == 0
+
+
+def test_what_does_not_fit_the_key_is_refused_before_the_link_is_opened(config, use):
+    link = use(Link())
+    arm = replace(KEY, scheme=small_scheme(channels=(Channel("a", "arm", ("shoulder",), 1, 0.1),)))
+    for key, message in ((KEY, (0, 1)), (arm, (1,))):
+        with pytest.raises(MtmError):
+            run_session(config, key, Plan(message), never)
+    with pytest.raises(MtmError, match="no channel 'z'"):
+        run_session(replace(config, robot=replace(config.robot, channel="z")), KEY, Plan(None), never)
+    assert link.events == []
