@@ -8,7 +8,7 @@ from hil.robots.direct import DirectTransport
 from hil.robots.motion_controller import MotionController
 from mtm_onboard.motion import BodyVelocity
 from tests.hil.robots.floating_plant import FloatingPlant
-from tests.onboard.transports.can_rig import can_rig
+from tests.onboard.transports.can_rig import LineRig, VirtualRig, can_rig
 from tests.onboard.transports.conformance import Rig, TransportConformance
 
 
@@ -39,9 +39,10 @@ def motion(rig, ticks=200):
     return poses, rig.plant.position_xy_m, rig.plant.commands
 
 
+@pytest.mark.parametrize("kind", [VirtualRig, LineRig])
 @pytest.mark.parametrize("poll_s", [0.001, 0.010])
-def test_the_motion_is_that_of_the_can_bus_bit_for_bit(poll_s):
-    with can_rig(deadman_s=0.2, poll_s=poll_s) as over_can:
+def test_the_motion_is_that_of_the_can_bus_bit_for_bit(kind, poll_s):
+    with can_rig(kind, deadman_s=0.2, poll_s=poll_s) as over_can:
         expected = motion(over_can)
     assert motion(direct_rig(0.2, poll_s)) == expected
     assert expected[0][-1] != ((0.0, 0.0), 0.0)

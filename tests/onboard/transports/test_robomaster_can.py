@@ -9,16 +9,16 @@ from mtm_onboard.protocol import MtmError
 from mtm_onboard.transports.duml import Parser, encode, segment
 from mtm_onboard.transports.robomaster_can import RoboMasterCan
 from mtm_onboard.transports.robomaster_messages import WORK_MODE
-from tests.onboard.transports.can_rig import can_rig
+from tests.onboard.transports.can_rig import LineRig, VirtualRig, can_rig
 from tests.onboard.transports.conformance import Rig, TransportConformance
 
 FORWARD = BodyVelocity(0.5, 0.0, 0.0)
 
 
 class TestRoboMasterCanConforms(TransportConformance):
-    @pytest.fixture
-    def rig(self):
-        with can_rig() as rig:
+    @pytest.fixture(params=[VirtualRig, LineRig])
+    def rig(self, request):
+        with can_rig(request.param) as rig:
             yield Rig(rig.transport, rig.controller, rig.plant, rig.clock, lambda: sum(map(len, rig.sent())))
 
 
