@@ -1,0 +1,1 @@
+"""Simulators that speak the real protocols and plug in where the hardware would."""

@@ -1,0 +1,75 @@
+"""The paper's RoboMaster task: four robots drive a six-waypoint zigzag side by side, then each to its own target.
+
+A proportional go-to-goal controller at the control rate gives each robot its base velocity, capped at the base
+speed; heading is held at zero. Positions are in the world frame, metres, origin at the arena's centre.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mtm_onboard.motion import BodyVelocity
+
+ROBOTS = 4
+BASE_SPEED_MPS = 0.5
+ARENA_HALF_M = 2.4
+
+_GAIN_PER_S = 1.5
+_HEADING_GAIN_PER_S = 2.0
+_ARRIVAL_M = 0.15
+_SPACING_M = 0.55
+_SWEEP_M = 2.4
+_FIRST_Y_M = -1.9
+_RISE_M = 0.5
+_TARGET_Y_M = 2.0
+
+
+@dataclass(frozen=True)
+class Route:
+    """Where one robot starts and the points (n, 2) it visits in order; it stays at the last one."""
+
+    start_xy_m: tuple[float, float]
+    points_xy_m: tuple[tuple[float, float], ...]
+
+
+def routes(permutation: tuple[int, ...]) -> tuple[Route, ...]:
+    """One route a robot: the zigzag, then target number `permutation[robot]` on the top edge."""
+    return tuple(_route(robot, target) for robot, target in enumerate(permutation))
+
+
+def random_permutation(generator: np.random.Generator) -> tuple[int, ...]:
+    """Which of the four targets each robot drives to."""
+    return tuple(int(target) for target in generator.permutation(ROBOTS))
+
+
+def _route(robot: int, target: int) -> Route:
+    lane_m = (robot - (ROBOTS - 1) / 2.0) * _SPACING_M
+    sides = (1.0, -1.0) * 3
+    zigzag = tuple((lane_m + side * _SWEEP_M / 2.0, _FIRST_Y_M + _RISE_M * (leg + 1)) for leg, side in enumerate(sides))
+    end = ((target - (ROBOTS - 1) / 2.0) * 1.2, _TARGET_Y_M)
+    return Route((lane_m, _FIRST_Y_M), (*zigzag, end))
+
+
+class GoToGoal:
+    """The task controller of one robot."""
+
+    def __init__(self, route: Route) -> None:
+        self._points_xy_m = route.points_xy_m
+        self._next = 0
+
+    def command(self, position_xy_m: tuple[float, float], heading_rad: float) -> BodyVelocity:
+        """Base velocity in the body frame for the present pose; moves on to the next point on arrival."""
+        goal_x_m, goal_y_m = self._points_xy_m[self._next]
+        x_m, y_m = goal_x_m - position_xy_m[0], goal_y_m - position_xy_m[1]
+        distance_m = math.hypot(x_m, y_m)
+        if distance_m < _ARRIVAL_M and self._next + 1 < len(self._points_xy_m):
+            self._next += 1
+            return self.command(position_xy_m, heading_rad)
+        scale = min(_GAIN_PER_S, BASE_SPEED_MPS / distance_m) if distance_m > 0.0 else 0.0
+        cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
+        return BodyVelocity(
+            scale * (cosine * x_m + sine * y_m),
+            scale * (cosine * y_m - sine * x_m),
+            -_HEADING_GAIN_PER_S * math.remainder(heading_rad, math.tau),
+        )

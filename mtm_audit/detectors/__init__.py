@@ -1,0 +1,1 @@
+"""Detectors: they score every candidate symbol of every window against a glimpse."""
