@@ -1,0 +1,158 @@
+"""Drawing the arena and its robots as one camera sees them at one instant."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.sensors import textures
+from hil.sensors.optics import Optics
+from hil.sensors.poses import Floats
+from mtm_audit.recordings.frames import Image
+
+SUPERSAMPLING = 4
+Maps = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """An arena of `arena_m` (length along x, width along y) centred on the origin.
+
+    Every robot carries the ArUco marker of its number in the list of trajectories, or, with `colours_bgr`, a plain
+    square of its own colour.
+    """
+
+    arena_m: tuple[float, float] = (4.5, 4.5)
+    colours_bgr: tuple[tuple[int, int, int], ...] | None = None
+
+    def top(self, number: int) -> Image:
+        """Premultiplied BGRA picture of robot `number` from above."""
+        if self.colours_bgr is None:
+            hard = textures.marker_top(number)
+        else:
+            hard = textures.coloured_top(self.colours_bgr[number % len(self.colours_bgr)])
+        # Edges as wide as the samples lie apart keep an edge along a pixel row from moving in steps.
+        return np.asarray(cv2.GaussianBlur(hard, (0, 0), 1.0), dtype=np.uint8)
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """One robot during one exposure: `poses` (k, 3), x and y in metres and heading, averaged with equal weight."""
+
+    top: Image
+    poses: Floats
+
+
+class Painter:
+    """Draws sightings over a background that is drawn once; holds the maps from pixels to the planes of the world.
+
+    Lengths are warped through the camera's exact projection, at four times the resolution and then averaged, so that
+    edges lie where the geometry puts them to about a hundredth of a pixel.
+    """
+
+    def __init__(self, scene: Scene, optics: Optics, blur_px: float = 0.0) -> None:
+        self._optics = optics
+        self._blur_px = blur_px
+        self._top_xy = _finite(optics.plane_xy_m(textures.ROBOT_HEIGHT_M))
+        self._floor_xy = _finite(optics.plane_xy_m(0.0))
+        self._shadow = textures.shadow()
+        self._background = self._draw_background(scene)
+
+    def paint(self, sightings: Sequence[Sighting]) -> Image:
+        """The picture (height, width, 3), blue green red; robots nearer to the camera hide those behind them."""
+        picture: Image = self._background.copy()
+        camera = np.asarray(self._optics.position_m)[:2]
+        for sighting in sorted(sightings, key=lambda one: -float(np.hypot(*(one.poses[0, :2] - camera)))):
+            self._draw_shadow(picture, sighting.poses)
+            region = self._region(sighting.poses, textures.TOP_SPAN_M)
+            if region is not None:
+                under = picture[region].astype(np.float32)
+                layers = [self._draw_robot(under, region, sighting.top, pose) for pose in sighting.poses]
+                picture[region] = np.clip(np.mean(layers, axis=0) + 0.5, 0, 255)
+        return picture
+
+    def _draw_background(self, scene: Scene) -> Image:
+        texture = textures.floor(*scene.arena_m)
+        maps = _texel_maps(self._floor_xy, np.zeros(3), texture.shape, textures.FLOOR_TEXELS_PER_M)
+        floor = _supersampled(texture, maps, textures.SURROUND_BGR).astype(np.float32)
+        floor *= _vignette(floor.shape[:2])[:, :, None]
+        if self._blur_px > 0:
+            floor = np.asarray(cv2.GaussianBlur(floor, (0, 0), self._blur_px), dtype=np.float32)
+        return np.asarray(np.clip(floor + 0.5, 0, 255), dtype=np.uint8)
+
+    def _region(self, poses: Floats, span_m: tuple[float, float]) -> tuple[slice, slice] | None:
+        """Rows and columns that things of that span around the robot can touch; None when outside the picture."""
+        reach = np.hypot(*span_m) / 2
+        offsets = reach * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
+        ground = (poses[:, None, :2] + offsets).reshape(-1, 2)
+        corners = np.concatenate([_at_height(ground, z) for z in (0.0, textures.ROBOT_HEIGHT_M)])
+        if np.any((corners - np.asarray(self._optics.position_m)) @ self._optics.rotation[2] < 0.05):
+            return None
+        pixels = self._optics.project(corners)
+        low = np.maximum(np.floor(pixels.min(axis=0) - 3 * self._blur_px), 0).astype(int)
+        high = np.ceil(pixels.max(axis=0) + 3 * self._blur_px).astype(int) + 1
+        high = np.minimum(high, [self._optics.width_px, self._optics.height_px])
+        return None if np.any(high - low < 2) else (slice(low[1], high[1]), slice(low[0], high[0]))
+
+    def _draw_shadow(self, picture: Image, poses: Floats) -> None:
+        """Darken the floor, in place; a shadow is soft, so the middle of the exposure stands for all of it."""
+        region = self._region(poses, textures.SHADOW_SPAN_M)
+        if region is not None:
+            pose = poses[len(poses) // 2]
+            maps = _texel_maps(self._floor_xy[region], pose, self._shadow.shape, textures.TEXELS_PER_M)
+            light = 1 - cv2.remap(self._shadow, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR)
+            picture[region] = (picture[region] * light[:, :, None] + 0.5).astype(np.uint8)
+
+    def _draw_robot(
+        self, under: NDArray[np.float32], region: tuple[slice, slice], top: Image, pose: Floats
+    ) -> NDArray[np.float32]:
+        maps = _texel_maps(self._top_xy[region], pose, top.shape, textures.TEXELS_PER_M)
+        plate = _supersampled(top, maps).astype(np.float32)
+        layer = plate + self._draw_sides(region, pose) * (1 - plate[:, :, 3:] / 255)
+        if self._blur_px > 0:
+            layer = np.asarray(cv2.GaussianBlur(layer, (0, 0), self._blur_px), dtype=np.float32)
+        return np.asarray(layer[:, :, :3] + under * (1 - layer[:, :, 3:] / 255), dtype=np.float32)
+
+    def _draw_sides(self, region: tuple[slice, slice], pose: Floats) -> NDArray[np.float32]:
+        """Premultiplied BGRA of the body below the top: the outline of its box."""
+        cos, sin = np.cos(pose[2]), np.sin(pose[2])
+        half = np.array([textures.ROBOT_LENGTH_M, textures.ROBOT_WIDTH_M]) / 2
+        corners = (half * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])) @ np.array([[cos, sin], [-sin, cos]])
+        points = np.concatenate([_at_height(corners + pose[:2], z) for z in (0.03, textures.ROBOT_HEIGHT_M)])
+        pixels = self._optics.project(points) - [region[1].start, region[0].start]
+        outline = cv2.convexHull(np.round(pixels * 16).astype(np.int32))
+        sides = np.zeros((region[0].stop - region[0].start, region[1].stop - region[1].start, 4), np.uint8)
+        cv2.fillConvexPoly(sides, outline, (34, 30, 28, 255), cv2.LINE_AA, 4)
+        return sides.astype(np.float32)
+
+
+def _finite(plane_xy_m: Floats) -> Maps:
+    """Pixels that look past the plane see a point far outside of everything."""
+    return np.nan_to_num(plane_xy_m, nan=1e4).clip(-1e4, 1e4).astype(np.float32)
+
+
+def _at_height(points_xy_m: Floats, height_m: float) -> Floats:
+    return np.column_stack([points_xy_m, np.full(len(points_xy_m), height_m)])
+
+
+def _texel_maps(plane_xy_m: Maps, pose: Floats, shape: tuple[int, ...], texels_per_m: int) -> Maps:
+    """Columns and rows of a texture that lies at `pose`, its columns along +x of the body, for points of its plane."""
+    cos, sin = texels_per_m * np.cos(pose[2]), texels_per_m * np.sin(pose[2])
+    turn = np.array([[cos, sin, 0.0], [sin, -cos, 0.0]])
+    turn[:, 2] = [(shape[1] - 1) / 2, (shape[0] - 1) / 2] - turn[:, :2] @ pose[:2]
+    return np.asarray(cv2.transform(plane_xy_m, turn), dtype=np.float32)
+
+
+def _supersampled(texture: Image, maps: Maps, beyond: tuple[int, ...] = (0, 0, 0, 0)) -> Image:
+    """The texture seen through `maps`, each pixel the mean of 4 x 4 samples; maps are smooth, so enlarging is exact."""
+    rows, columns = maps.shape[:2]
+    fine = cv2.resize(maps, (columns * SUPERSAMPLING, rows * SUPERSAMPLING), interpolation=cv2.INTER_LINEAR)
+    warped = cv2.remap(texture, fine[..., 0], fine[..., 1], cv2.INTER_LINEAR, borderValue=beyond)
+    return np.asarray(cv2.resize(warped, (columns, rows), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def _vignette(shape: tuple[int, int]) -> NDArray[np.float32]:
+    rows, columns = (np.linspace(-1, 1, count, dtype=np.float32) for count in shape)
+    return np.asarray(1.04 - 0.12 * (rows[:, None] ** 2 + columns**2) / 2 - 0.04 * columns, dtype=np.float32)

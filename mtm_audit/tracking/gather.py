@@ -1,0 +1,63 @@
+"""Collecting what a tracker sees, frame by frame, into tracks."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mtm_audit.recordings.frames import Frame
+from mtm_audit.tracks import Track
+from mtm_onboard.protocol.errors import MtmError
+
+Progress = Callable[[int], None]
+
+
+@dataclass
+class Gather:
+    """Observations in pixels, x to the right and y up, as (x, y, heading) under a name; one row per frame.
+
+    A body that is not put in between two calls of `next_frame` was not seen in that frame.
+    """
+
+    height_px: int = 0
+    times_s: list[float] = field(default_factory=list)
+    seen: dict[str, dict[int, tuple[float, float, float]]] = field(default_factory=dict)
+
+    def next_frame(self, frame: Frame) -> None:
+        """Open the row of the next frame."""
+        self.height_px = frame.size[1]
+        self.times_s.append(frame.time_s)
+
+    def put(self, name: str, column: float, row: float, heading_rad: float = np.nan) -> None:
+        """Note where a body is in the current frame: picture coordinates (y down), heading counter-clockwise."""
+        self.seen.setdefault(name, {})[len(self.times_s) - 1] = (column, self.height_px - 1 - row, heading_rad)
+
+    def tracks(self, with_headings: bool) -> list[Track]:
+        """One track per body, in the order of their names; NaN and not valid in frames in which it was not seen."""
+        times_s = np.asarray(self.times_s, dtype=np.float64)
+        found = []
+        for name in sorted(self.seen):
+            table = np.full((len(times_s), 3), np.nan)
+            table[list(self.seen[name])] = list(self.seen[name].values())
+            valid = np.asarray(np.isfinite(table[:, 0]))
+            headings = table[:, 2] if with_headings else None
+            found.append(Track(name, times_s, table[:, :2], valid, unit="px", headings_rad=headings))
+        return found
+
+
+def steady(frames: Iterable[Frame], progress: Progress | None = None) -> Iterator[Frame]:
+    """Pass frames on, calling `progress` with the number of frames so far.
+
+    Raises MtmError when the size of the picture changes, since pixels would then change their meaning.
+    """
+    size: tuple[int, int] | None = None
+    for count, frame in enumerate(frames, 1):
+        if size is not None and frame.size != size:
+            raise MtmError(
+                f"the picture changes from {size[0]} x {size[1]} to {frame.size[0]} x {frame.size[1]} at "
+                f"{frame.time_s:.3f} s; cut the video there and decode the parts one by one"
+            )
+        size = frame.size
+        yield frame
+        if progress is not None:
+            progress(count)

@@ -1,0 +1,35 @@
+"""Trackers by name."""
+
+from collections.abc import Iterable
+from typing import Protocol
+
+from mtm_audit.recordings.frames import Frame, Pixels
+from mtm_audit.tracking.gather import Progress
+from mtm_audit.tracks import Track
+from mtm_onboard.protocol.errors import MtmError
+
+TRACKERS = "aruco, aruco:mirrored, colour:<name or #rrggbb>[,<another>...]"
+
+
+class Tracker(Protocol):
+    """Turns frames of the `pixels` that it wants into tracks."""
+
+    pixels: Pixels
+
+    def track(self, frames: Iterable[Frame], progress: Progress | None = None) -> list[Track]:
+        """One track per thing seen; raises MtmError when nothing is seen or the size of the picture changes."""
+        ...
+
+
+def tracker(name: str) -> Tracker:
+    """The tracker of that name: `aruco`, `aruco:mirrored` or `colour:red,#00ffff`; raises MtmError for others."""
+    kind, _, choice = name.partition(":")
+    if kind == "aruco" and choice in ("", "mirrored"):
+        from mtm_audit.tracking.aruco import ArucoTracker
+
+        return ArucoTracker(mirrored=True if choice else None)
+    if kind == "colour" and choice:
+        from mtm_audit.tracking.colour import ColourTracker
+
+        return ColourTracker(tuple(part.strip() for part in choice.split(",")))
+    raise MtmError(f"there is no tracker {name!r}; choose one of: {TRACKERS}")

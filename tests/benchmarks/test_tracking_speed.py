@@ -1,0 +1,65 @@
+"""How much faster than real time recordings are made and read, on one core."""
+
+import cv2
+import numpy as np
+import pytest
+
+from hil.sensors.camera import Camera, film
+from hil.sensors.poses import Trajectory
+from hil.sensors.scene import Scene
+from hil.sensors.video import write_video
+from mtm_audit.recordings.load import load_tracks
+
+SECONDS = 4.0
+COLOURS_BGR = ((255, 255, 0), (255, 0, 255), (0, 230, 230), (30, 30, 230))
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    yield
+    cv2.setNumThreads(threads)
+
+
+def four_robots():
+    times_s = np.arange(round(SECONDS * 200) + 1) / 200
+    robots = []
+    for number in range(4):
+        angles = np.pi / 2 * number + 0.5 * times_s
+        positions = np.stack([1.3 * np.cos(angles), 1.1 * np.sin(angles)], axis=1)
+        robots.append(Trajectory(f"robot{number}", times_s, positions, angles))
+    return robots
+
+
+def record(path, scene):
+    write_video(film(Camera(blur_px=0.5), scene, four_robots(), np.random.default_rng(1)), path)
+
+
+def times_real_time(benchmark, label):
+    """Print and return the ratio; without benchmarks switched on nothing was timed and the ratio is unknown."""
+    if not benchmark.enabled:
+        return None
+    ratio = SECONDS / benchmark.stats.stats.min
+    benchmark.extra_info["times_real_time"] = round(ratio, 1)
+    print(f"\n{label}: {ratio:.1f} times real time at 704 x 704, 30 Hz, four robots")
+    return ratio
+
+
+@pytest.mark.parametrize(
+    ("name", "scene"),
+    [("aruco", Scene()), ("colour:cyan,magenta,yellow,red", Scene(colours_bgr=COLOURS_BGR))],
+    ids=["aruco", "colour"],
+)
+def test_tracking_a_video_takes_at_most_half_its_length(tmp_path, benchmark, name, scene):
+    record(tmp_path / "film.mp4", scene)
+    tracks = benchmark.pedantic(load_tracks, args=(tmp_path / "film.mp4", name), rounds=3)
+    assert [track.valid.all() for track in tracks] == [True] * 4
+    ratio = times_real_time(benchmark, name)
+    assert ratio is None or ratio >= 2
+
+
+def test_filming_takes_at_most_a_third_of_the_time_filmed(tmp_path, benchmark):
+    benchmark.pedantic(record, args=(tmp_path / "film.mp4", Scene()), rounds=3)
+    ratio = times_real_time(benchmark, "filming")
+    assert ratio is None or ratio >= 3
