@@ -38,8 +38,6 @@ class ArucoTracker:
     def __init__(self, mirrored: bool | None = None) -> None:
         self._mirrored = mirrored
         parameters = cv2.aruco.DetectorParameters()
-        # One threshold window, which suits markers of 15 to 150 pixels, takes a third of the time of the usual three.
-        parameters.adaptiveThreshWinSizeMin = parameters.adaptiveThreshWinSizeMax = 15
         parameters.minMarkerPerimeterRate = 0.02
         # Lines fitted to the sides measure small markers three times better than corner refinement does.
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
@@ -53,6 +51,7 @@ class ArucoTracker:
         """
         gather = Gather()
         followed: dict[int, _Followed] = {}
+        known: set[int] = set()
         mirrored = self._mirrored
         for number, frame in enumerate(steady(frames, progress)):
             gather.next_frame(frame)
@@ -60,8 +59,9 @@ class ArucoTracker:
                 mirrored = self._find_mirroring(frame.image)
             image = np.ascontiguousarray(frame.image[:, ::-1]) if mirrored else frame.image
             found = self._search_near(image, followed)
-            if not followed or len(found) < len(followed) or number % FULL_SEARCH_EVERY == 0:
+            if not known or len(found) < len(known) or number % FULL_SEARCH_EVERY == 0:
                 found = self._search(image) | found
+                known |= found.keys()
             for marker, corners in found.items():
                 gather.put(f"marker{marker}", *_pose(corners))
             followed = {marker: _follow(followed.get(marker), corners) for marker, corners in found.items()}
