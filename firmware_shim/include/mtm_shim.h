@@ -251,7 +251,7 @@ typedef struct {
     mtm_duml_head head; /* of the last speed command */
     mtm_velocity arriving;
     uint32_t last_tick, due_us;
-    uint8_t queued, released, gone, reverse_full, rewriting, changed, armed, fill, due;
+    uint8_t queued, ready, gone, held_from, reverse_full, rewriting, changed, armed, fill, due;
 } mtm_gateway;
 
 /* `shim` and `board` must outlive the gateway; the shim is ticked by the gateway alone. */

@@ -112,6 +112,9 @@ static void rewrite(mtm_gateway *gateway, uint32_t at, uint8_t *slot)
 {
     if (at < SPEED_BYTES - 2) {
         const uint32_t part = (at - PAYLOAD) & 3u;
+        if (part == 0 || gateway->slot[part - 1] == NULL) {
+            gateway->held_from = (uint8_t)(gateway->queued - 1);
+        }
         gateway->slot[part] = slot;
         if (part == 3) {
             finish_value(gateway, (at - PAYLOAD) >> 2);
@@ -206,10 +209,10 @@ static void release(mtm_gateway *gateway)
     for (i = 0; i < 4; i++) {
         gateway->slot[i] = NULL;
     }
-    gateway->released = 1;
+    gateway->ready = gateway->queued;
 }
 
-/* Two or three bytes of a value have come, and none of them can be known before the fourth. */
+/* Two or three bytes of a value have come and none has left: they cannot be known before the fourth. */
 static uint8_t must_wait(const mtm_gateway *gateway)
 {
     const uint32_t at = gateway->parser.count;
@@ -226,7 +229,9 @@ static void frame_arrived(mtm_gateway *gateway, const mtm_frame *frame)
             byte_arrived(gateway, &place->data[i]);
         }
     }
-    if (!must_wait(gateway) || gateway->queued == MTM_QUEUE_FRAMES) {
+    if (must_wait(gateway) && gateway->queued < MTM_QUEUE_FRAMES) {
+        gateway->ready = gateway->held_from;
+    } else {
         release(gateway);
     }
 }
@@ -235,18 +240,17 @@ static void frame_arrived(mtm_gateway *gateway, const mtm_frame *frame)
 static uint8_t drain(mtm_gateway *gateway)
 {
     const mtm_board *board = gateway->board;
-    if (!gateway->released) {
-        return 1;
-    }
-    while (gateway->gone < gateway->queued) {
+    while (gateway->gone < gateway->ready) {
         if (!board->send(board->context, MTM_CONTROLLER, &gateway->queue[gateway->gone])) {
             return 0;
         }
         gateway->gone++;
     }
-    gateway->queued = 0;
-    gateway->gone = 0;
-    gateway->released = 0;
+    if (gateway->gone == gateway->queued) {
+        gateway->queued = 0;
+        gateway->gone = 0;
+        gateway->ready = 0;
+    }
     return 1;
 }
 
