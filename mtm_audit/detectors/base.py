@@ -1,0 +1,71 @@
+"""What every detector returns, and the interface behind which all of them stand."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mtm_audit.glimpse import Glimpse
+from mtm_audit.timing import Timing
+from mtm_audit.tracks import Floats
+from mtm_onboard.protocol.codebook import Codebook
+from mtm_onboard.protocol.scheme import Channel
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One channel of one recording under one codebook.
+
+    `scores` (positions, M): evidence for each symbol at each of the message's l_c positions, all repeats taken
+    together; `window_scores` (windows, M) the same for every window seen, `window_positions` (windows,) which
+    position each window carries, `window_starts_s` (windows,) when it began. `strength` is the single number that a
+    verdict compares between the key and its decoys: larger means more evidence of any message at all.
+    """
+
+    timing: Timing
+    scores: Floats
+    window_scores: Floats
+    window_positions: NDArray[np.int64]
+    window_starts_s: Floats
+    strength: float
+
+
+class Detector(Protocol):
+    """Scores one channel over a whole recording, for several codebooks at once.
+
+    The codebooks (the key's own and its decoys') share one scheme. `onset_s` is when the message began, or None
+    when that is searched for too; everything that is searched is searched for each codebook anew.
+    """
+
+    name: str
+
+    def read(
+        self, codebooks: Sequence[Codebook], channel: Channel, glimpse: Glimpse, onset_s: float | None
+    ) -> list[Reading]:
+        """One reading for each codebook; raises MtmError when the recording is too short for a window."""
+        ...
+
+
+def whole_windows(glimpse: Glimpse, timing: Timing, window_ticks: int, *, backwards: bool) -> NDArray[np.int64]:
+    """Numbers of the windows that lie wholly inside the recording, counted from the onset.
+
+    With `backwards` windows before the onset count as well (negative numbers): the message had begun earlier.
+    A window may stick out by a tenth of a tick.
+    """
+    length_s = window_ticks / timing.rate_hz
+    slack_s = 0.1 / timing.rate_hz
+    first = np.ceil((glimpse.edges_s[0] - slack_s - timing.onset_s) / length_s)
+    last = np.floor((glimpse.edges_s[-1] + slack_s - timing.onset_s) / length_s)
+    return np.arange(int(first) if backwards else max(0, int(first)), max(int(last), int(first)))
+
+
+def combine_repeats(window_scores: Floats, positions: NDArray[np.int64], count: int) -> Floats:
+    """Mean over the repeats of each message position: (windows, M) to (count, M); zeros where none was seen."""
+    combined = np.zeros((count, window_scores.shape[1]))
+    for position in range(count):
+        rows = window_scores[positions == position]
+        if len(rows):
+            combined[position] = rows.mean(axis=0)
+    return combined

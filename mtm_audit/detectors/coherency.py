@@ -1,0 +1,133 @@
+"""The paper's detector: mean magnitude of Welch coherency over the band, maximised over 101 rates, pooled over axes.
+
+Appendix "Detection Pipeline Details" of the paper: Hann window, nperseg = min(128, L / 2), three quarters overlap,
+nfft = L, L being the window in ticks; the glimpse is resampled at each candidate rate.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mtm_audit.detectors.base import Reading, combine_repeats, whole_windows
+from mtm_audit.detectors.welch import Complexes, mean_coherency, segment_spectra
+from mtm_audit.glimpse import Glimpse, tick_velocities
+from mtm_audit.timing import RATE_SCALES, Timing, find_onset, plan_onset_search
+from mtm_audit.tracks import Floats
+from mtm_onboard.protocol.codebook import Codebook
+from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.scheme import Channel
+
+
+class CoherencyDetector:
+    """The paper's detector behind the common interface."""
+
+    name = "coherency"
+
+    def read(
+        self, codebooks: Sequence[Codebook], channel: Channel, glimpse: Glimpse, onset_s: float | None
+    ) -> list[Reading]:
+        """Score every window; without an onset, GCC-PHAT finds one for each codebook at each candidate rate."""
+        scheme = codebooks[0].scheme
+        ticks = scheme.window_ticks(channel)
+        axes = _axes(channel, glimpse)
+        if onset_s is not None:
+            timing = Timing(onset_s, scheme.rate_hz)
+            return self._score_group(codebooks, [timing] * len(codebooks), channel, axes, searched=False)
+        rates_hz = scheme.rate_hz * RATE_SCALES
+        band = np.array(scheme.band_hz) / scheme.rate_hz
+        plan = plan_onset_search(axes, rates_hz, band, ticks)
+        distinct = 1 if scheme.schedule == "fixed" else channel.symbols
+        timings = [
+            find_onset(plan, [codebook.samples(channel, n) for n in range(distinct)], channel.symbols, ticks)
+            for codebook in codebooks
+        ]
+        return self._score_group(codebooks, timings, channel, axes, searched=True)
+
+    def _score_group(
+        self,
+        codebooks: Sequence[Codebook],
+        timings: Sequence[Timing],
+        channel: Channel,
+        glimpse: Glimpse,
+        *,
+        searched: bool,
+    ) -> list[Reading]:
+        """Score all codebooks; those that share a timing share the observed spectra."""
+        readings: list[Reading | None] = [None] * len(codebooks)
+        for timing in dict.fromkeys(timings):
+            members = [index for index, other in enumerate(timings) if other == timing]
+            group = [codebooks[index] for index in members]
+            for index, reading in zip(members, _read_at(group, channel, glimpse, timing, searched), strict=True):
+                readings[index] = reading
+        return [reading for reading in readings if reading is not None]
+
+
+def rate_searched_scores(
+    codebook: Codebook, channel: Channel, glimpse: Glimpse, onset_s: float, window: int = 0
+) -> Floats:
+    """The paper's score of each candidate in one window: best mean coherency over the 101 rates, shape (M,)."""
+    observed = _observed_spectra(_axes(channel, glimpse), codebook, channel, onset_s, window)
+    best: Floats = mean_coherency(_reference_spectra([codebook], channel, window)[0], observed).max(axis=1)
+    return best
+
+
+def _read_at(
+    codebooks: Sequence[Codebook], channel: Channel, glimpse: Glimpse, timing: Timing, searched: bool
+) -> list[Reading]:
+    scheme = codebooks[0].scheme
+    ticks = scheme.window_ticks(channel)
+    backwards = searched and scheme.schedule == "fixed"
+    windows = whole_windows(glimpse, timing, ticks, backwards=backwards)
+    if not len(windows):
+        length_s = ticks / scheme.rate_hz
+        raise MtmError(
+            f"the recording of {glimpse.name!r} holds no whole window of {length_s:g} s after the onset; record at "
+            f"least {channel.symbols * length_s:g} s of the message"
+        )
+    count, size = len(codebooks), scheme.alphabet_size
+    scores = np.empty((count, len(windows), size))
+    references: list[Complexes] | None = None
+    for row, window in enumerate(windows):
+        if references is None or scheme.schedule == "rolling":
+            references = _reference_spectra(codebooks, channel, int(window))
+        # Rates scale the time since the onset, so the search stays the paper's however late the window is.
+        observed = _observed_spectra(glimpse, codebooks[0], channel, timing.onset_s, int(window))
+        for number, reference in enumerate(references):
+            scores[number, row] = mean_coherency(reference, observed).max(axis=1)
+    positions = np.mod(windows, channel.symbols)
+    starts_s = timing.onset_s + windows * ticks / timing.rate_hz
+    return [_reading(timing, scores[number], positions, starts_s, channel.symbols) for number in range(count)]
+
+
+def _reading(timing: Timing, scores: Floats, positions: NDArray[np.int64], starts_s: Floats, symbols: int) -> Reading:
+    combined = combine_repeats(scores, positions, symbols)
+    seen = np.isin(np.arange(symbols), positions)
+    strength = float(combined[seen].max(axis=1).mean())
+    return Reading(timing, combined, scores, positions, starts_s, strength)
+
+
+def _reference_spectra(codebooks: Sequence[Codebook], channel: Channel, window: int) -> list[Complexes]:
+    bins = codebooks[0].bins(channel)
+    return [segment_spectra(codebook.samples(channel, window), bins) for codebook in codebooks]
+
+
+def _observed_spectra(glimpse: Glimpse, codebook: Codebook, channel: Channel, onset_s: float, window: int) -> Complexes:
+    scheme = codebook.scheme
+    ticks = scheme.window_ticks(channel)
+    observed = [
+        tick_velocities(glimpse, onset_s + window * ticks / rate_hz, float(rate_hz), ticks).T
+        for rate_hz in scheme.rate_hz * RATE_SCALES
+    ]
+    return segment_spectra(np.stack(observed), codebook.bins(channel))
+
+
+def _axes(channel: Channel, glimpse: Glimpse) -> Glimpse:
+    """The observed axes that stand for the channel's own, in order: the first ones of the track."""
+    count = len(channel.axes)
+    if glimpse.velocities.shape[1] < count:
+        raise MtmError(
+            f"track {glimpse.name!r} shows {glimpse.velocities.shape[1]} axes but channel {channel.name!r} has {count};"
+            " use a tracker that sees them all"
+        )
+    return Glimpse(glimpse.name, glimpse.edges_s, glimpse.velocities[:, :count], glimpse.valid, glimpse.axes[:count])
