@@ -69,13 +69,14 @@ def film(
     noise = _noise_field(camera, rng)
     painter = Painter(scene, camera.optics, camera.blur_px)
     tops, cloth = [scene.top(number) for number in range(len(trajectories))], textures.covered_top()
-    for time_s in times_s:
-        instants_s = first_s + time_s + _shutter(camera)
-        sightings = []
-        for trajectory, top in zip(trajectories, tops, strict=True):
-            positions, headings = trajectory.at(instants_s)
-            hidden = occluded(camera.occlusions, trajectory.name, np.array([first_s + time_s]))[0]
-            sightings.append(Sighting(cloth if hidden else top, np.column_stack([positions, headings])))
+    shutter_s = _shutter(camera)
+    instants_s = first_s + (times_s[:, None] + shutter_s).ravel()
+    poses = [np.column_stack(robot.at(instants_s)).reshape(-1, len(shutter_s), 3) for robot in trajectories]
+    hidden = [occluded(camera.occlusions, robot.name, first_s + times_s) for robot in trajectories]
+    for index, time_s in enumerate(times_s):
+        sightings = [
+            Sighting(cloth if hidden[number][index] else top, poses[number][index]) for number, top in enumerate(tops)
+        ]
         yield Frame(float(time_s), _with_noise(painter.paint(sightings), noise, rng))
 
 

@@ -12,7 +12,8 @@ from hil.sensors.optics import Optics
 from hil.sensors.poses import Floats
 from mtm_audit.recordings.frames import Image
 
-SUPERSAMPLING = 4
+SUPERSAMPLING = 3
+CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 Maps = NDArray[np.float32]
 
 
@@ -34,7 +35,7 @@ class Scene:
         else:
             hard = textures.coloured_top(self.colours_bgr[number % len(self.colours_bgr)])
         # Edges as wide as the samples lie apart keep an edge along a pixel row from moving in steps.
-        return np.asarray(cv2.GaussianBlur(hard, (0, 0), 1.0), dtype=np.uint8)
+        return np.asarray(cv2.GaussianBlur(hard, (0, 0), 1.3), dtype=np.uint8)
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,8 @@ class Sighting:
 class Painter:
     """Draws sightings over a background that is drawn once; holds the maps from pixels to the planes of the world.
 
-    Lengths are warped through the camera's exact projection, at four times the resolution and then averaged, so that
-    edges lie where the geometry puts them to about a hundredth of a pixel.
+    Tops are warped through the camera's exact projection, at several times the resolution, and then averaged, so that
+    they lie where the geometry puts them to about a hundredth of a pixel.
     """
 
     def __init__(self, scene: Scene, optics: Optics, blur_px: float = 0.0) -> None:
@@ -65,9 +66,9 @@ class Painter:
         picture: Image = self._background.copy()
         camera = np.asarray(self._optics.position_m)[:2]
         for sighting in sorted(sightings, key=lambda one: -float(np.hypot(*(one.poses[0, :2] - camera)))):
-            self._draw_shadow(picture, sighting.poses)
-            region = self._region(sighting.poses, textures.TOP_SPAN_M)
+            region = self._region(sighting.poses)
             if region is not None:
+                self._draw_shadow(picture, region, sighting.poses)
                 under = picture[region].astype(np.float32)
                 layers = [self._draw_robot(under, region, sighting.top, pose) for pose in sighting.poses]
                 picture[region] = np.clip(np.mean(layers, axis=0) + 0.5, 0, 255)
@@ -76,40 +77,49 @@ class Painter:
     def _draw_background(self, scene: Scene) -> Image:
         texture = textures.floor(*scene.arena_m)
         maps = _texel_maps(self._floor_xy, np.zeros(3), texture.shape, textures.FLOOR_TEXELS_PER_M)
-        floor = _supersampled(texture, maps, textures.SURROUND_BGR).astype(np.float32)
+        floor = _supersampled(texture, maps, 2, textures.SURROUND_BGR).astype(np.float32)
         floor *= _vignette(floor.shape[:2])[:, :, None]
         if self._blur_px > 0:
             floor = np.asarray(cv2.GaussianBlur(floor, (0, 0), self._blur_px), dtype=np.float32)
         return np.asarray(np.clip(floor + 0.5, 0, 255), dtype=np.uint8)
 
-    def _region(self, poses: Floats, span_m: tuple[float, float]) -> tuple[slice, slice] | None:
-        """Rows and columns that things of that span around the robot can touch; None when outside the picture."""
-        reach = np.hypot(*span_m) / 2
-        offsets = reach * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
-        ground = (poses[:, None, :2] + offsets).reshape(-1, 2)
-        corners = np.concatenate([_at_height(ground, z) for z in (0.0, textures.ROBOT_HEIGHT_M)])
+    def _region(self, poses: Floats) -> tuple[slice, slice] | None:
+        """Rows and columns that the robot touches in any of the poses; None when it is outside of the picture."""
+        cos, sin = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
+        along, across = (CORNERS * textures.TOP_SPAN_M / 2).T
+        ground = np.stack([cos * along - sin * across, sin * along + cos * across], axis=-1) + poses[:, None, :2]
+        corners = np.concatenate([_at_height(ground.reshape(-1, 2), z) for z in (0.0, textures.ROBOT_HEIGHT_M)])
         if np.any((corners - np.asarray(self._optics.position_m)) @ self._optics.rotation[2] < 0.05):
             return None
         pixels = self._optics.project(corners)
-        low = np.maximum(np.floor(pixels.min(axis=0) - 3 * self._blur_px), 0).astype(int)
-        high = np.ceil(pixels.max(axis=0) + 3 * self._blur_px).astype(int) + 1
-        high = np.minimum(high, [self._optics.width_px, self._optics.height_px])
-        return None if np.any(high - low < 2) else (slice(low[1], high[1]), slice(low[0], high[0]))
+        return self._clipped(pixels.min(axis=0) - 2 - 3 * self._blur_px, pixels.max(axis=0) + 3 + 3 * self._blur_px)
 
-    def _draw_shadow(self, picture: Image, poses: Floats) -> None:
-        """Darken the floor, in place; a shadow is soft, so the middle of the exposure stands for all of it."""
-        region = self._region(poses, textures.SHADOW_SPAN_M)
-        if region is not None:
-            pose = poses[len(poses) // 2]
-            maps = _texel_maps(self._floor_xy[region], pose, self._shadow.shape, textures.TEXELS_PER_M)
-            light = 1 - cv2.remap(self._shadow, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR)
-            picture[region] = (picture[region] * light[:, :, None] + 0.5).astype(np.uint8)
+    def _clipped(self, low: Floats, high: Floats) -> tuple[slice, slice] | None:
+        """Rows and columns between two points (column, row), inside the picture; None when less than two are left."""
+        size = self._optics.width_px, self._optics.height_px
+        first, last = np.clip(low, 0, size).astype(int), np.clip(high, 0, size).astype(int)
+        return None if np.any(last - first < 2) else (slice(first[1], last[1]), slice(first[0], last[0]))
+
+    def _draw_shadow(self, picture: Image, region: tuple[slice, slice], poses: Floats) -> None:
+        """Darken the floor around the robot, in place.
+
+        A shadow is soft, so the middle of the exposure and every fourth pixel stand for all of them.
+        """
+        low, high = (np.array([getattr(part, end) for part in region[::-1]]) for end in ("start", "stop"))
+        wide = self._clipped(low - 0.4 * (high - low).max(), high + 0.4 * (high - low).max())
+        if wide is not None:
+            rows, columns = wide
+            coarse = self._floor_xy[rows.start : rows.stop : 4, columns.start : columns.stop : 4]
+            maps = _texel_maps(coarse, poses[len(poses) // 2], self._shadow.shape, textures.TEXELS_PER_M)
+            dark = cv2.remap(self._shadow, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR)
+            light = 1 - cv2.resize(dark, (columns.stop - columns.start, rows.stop - rows.start))
+            picture[wide] = picture[wide] * light[:, :, None] + 0.5
 
     def _draw_robot(
         self, under: NDArray[np.float32], region: tuple[slice, slice], top: Image, pose: Floats
     ) -> NDArray[np.float32]:
         maps = _texel_maps(self._top_xy[region], pose, top.shape, textures.TEXELS_PER_M)
-        plate = _supersampled(top, maps).astype(np.float32)
+        plate = _supersampled(top, maps, SUPERSAMPLING).astype(np.float32)
         layer = plate + self._draw_sides(region, pose) * (1 - plate[:, :, 3:] / 255)
         if self._blur_px > 0:
             layer = np.asarray(cv2.GaussianBlur(layer, (0, 0), self._blur_px), dtype=np.float32)
@@ -119,7 +129,7 @@ class Painter:
         """Premultiplied BGRA of the body below the top: the outline of its box."""
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
         half = np.array([textures.ROBOT_LENGTH_M, textures.ROBOT_WIDTH_M]) / 2
-        corners = (half * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])) @ np.array([[cos, sin], [-sin, cos]])
+        corners = (half * CORNERS) @ np.array([[cos, sin], [-sin, cos]])
         points = np.concatenate([_at_height(corners + pose[:2], z) for z in (0.03, textures.ROBOT_HEIGHT_M)])
         pixels = self._optics.project(points) - [region[1].start, region[0].start]
         outline = cv2.convexHull(np.round(pixels * 16).astype(np.int32))
@@ -145,10 +155,10 @@ def _texel_maps(plane_xy_m: Maps, pose: Floats, shape: tuple[int, ...], texels_p
     return np.asarray(cv2.transform(plane_xy_m, turn), dtype=np.float32)
 
 
-def _supersampled(texture: Image, maps: Maps, beyond: tuple[int, ...] = (0, 0, 0, 0)) -> Image:
-    """The texture seen through `maps`, each pixel the mean of 4 x 4 samples; maps are smooth, so enlarging is exact."""
+def _supersampled(texture: Image, maps: Maps, samples: int, beyond: tuple[int, ...] = (0, 0, 0, 0)) -> Image:
+    """The texture seen through `maps`, each pixel the mean of `samples` squared; smooth maps may be enlarged."""
     rows, columns = maps.shape[:2]
-    fine = cv2.resize(maps, (columns * SUPERSAMPLING, rows * SUPERSAMPLING), interpolation=cv2.INTER_LINEAR)
+    fine = cv2.resize(maps, (columns * samples, rows * samples), interpolation=cv2.INTER_LINEAR)
     warped = cv2.remap(texture, fine[..., 0], fine[..., 1], cv2.INTER_LINEAR, borderValue=beyond)
     return np.asarray(cv2.resize(warped, (columns, rows), interpolation=cv2.INTER_AREA), dtype=np.uint8)
 

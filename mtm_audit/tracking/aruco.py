@@ -37,12 +37,8 @@ class ArucoTracker:
 
     def __init__(self, mirrored: bool | None = None) -> None:
         self._mirrored = mirrored
-        parameters = cv2.aruco.DetectorParameters()
-        parameters.minMarkerPerimeterRate = 0.02
-        # Lines fitted to the sides measure small markers three times better than corner refinement does.
-        parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
-        dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
-        self._detector = cv2.aruco.ArucoDetector(dictionary, parameters)
+        self._thorough = _detector()
+        self._quick = _detector(threshold_window_px=15)
 
     def track(self, frames: Iterable[Frame], progress: Progress | None = None) -> list[Track]:
         """Track every marker in gray `frames`: one track per marker, `marker<id>`, in pixels with y up, with headings.
@@ -78,9 +74,9 @@ class ArucoTracker:
         plain, flipped = len(self._search(image)), len(self._search(np.ascontiguousarray(image[:, ::-1])))
         return flipped > plain if plain or flipped else None
 
-    def _search(self, image: Image) -> Found:
+    def _search(self, image: Image, quick: bool = False) -> Found:
         """Corners (4, 2) of every marker in the picture, by number; a marker seen twice counts where it is largest."""
-        quads, numbers, _ = self._detector.detectMarkers(image)
+        quads, numbers, _ = (self._quick if quick else self._thorough).detectMarkers(image)
         corners = [np.asarray(quad, dtype=np.float64).reshape(4, 2) for quad in quads]
         order = sorted(range(len(corners)), key=lambda index: float(np.ptp(corners[index], axis=0).sum()))
         return {int(np.ravel(numbers[index])[0]): corners[index] for index in order}
@@ -96,10 +92,23 @@ class ArucoTracker:
             right, lower = np.maximum(high + margin, 0).astype(int)
             window = image[upper:lower, left:right]
             if min(window.shape) > 16:
-                corners = self._search(np.ascontiguousarray(window)).get(marker)
-                if corners is not None:
-                    found[marker] = corners + np.array([left, upper])
+                window = np.ascontiguousarray(window)
+                near = self._search(window, quick=True)
+                near = near if marker in near else self._search(window)
+                if marker in near:
+                    found[marker] = near[marker] + np.array([left, upper])
         return found
+
+
+def _detector(threshold_window_px: int | None = None) -> cv2.aruco.ArucoDetector:
+    """A detector that binarises the picture over one window size, or over three (slower, and loses fewer markers)."""
+    parameters = cv2.aruco.DetectorParameters()
+    if threshold_window_px is not None:
+        parameters.adaptiveThreshWinSizeMin = parameters.adaptiveThreshWinSizeMax = threshold_window_px
+    parameters.minMarkerPerimeterRate = 0.02
+    # Lines fitted to the sides measure small markers three times better than corner refinement does.
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
+    return cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), parameters)
 
 
 def _follow(last: _Followed | None, corners: Floats) -> _Followed:

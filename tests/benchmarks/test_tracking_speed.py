@@ -1,4 +1,9 @@
-"""How much faster than real time recordings are made and read, on one core."""
+"""How much faster than real time recordings are made and read, on one core.
+
+Processor time is what is measured, of all threads together: it is the time one core would take, whatever else runs.
+"""
+
+import time
 
 import cv2
 import numpy as np
@@ -10,7 +15,8 @@ from hil.sensors.scene import Scene
 from hil.sensors.video import write_video
 from mtm_audit.recordings.load import load_tracks
 
-SECONDS = 4.0
+pytestmark = pytest.mark.benchmark(timer=time.process_time)
+SECONDS = 8.0
 COLOURS_BGR = ((255, 255, 0), (255, 0, 255), (0, 230, 230), (30, 30, 230))
 
 

@@ -73,9 +73,10 @@ def test_a_mirrored_camera_shows_the_flipped_picture():
     plain = first_picture(Camera(overhead()), Scene(), [still()])
     optics = Optics((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), overhead().focal_px, mirrored=True)
     mirrored = first_picture(Camera(optics), Scene(), [still()])
-    robot = np.abs(plain.astype(int) - np.median(plain)) > 60
+    robot = plain < 60
     assert robot.sum() > 300
-    assert mirrored[:, ::-1][robot] == pytest.approx(plain[robot], abs=12)
+    assert np.abs(mirrored[:, ::-1][robot].astype(int) - plain[robot]).mean() < 10
+    assert np.abs(mirrored[robot].astype(int) - plain[robot]).mean() > 50
 
 
 def test_the_nearer_robot_hides_the_one_behind_it():
@@ -95,7 +96,7 @@ def test_a_long_exposure_smears_what_moves():
         first_picture(Camera(exposure_s=exposure_s, sub_exposures=6), Scene(), [moving(2.0)])
         for exposure_s in (0.0, 0.03)
     )
-    contrast = [cv2.Laplacian(picture, cv2.CV_64F).std() for picture in (sharp, smeared)]
+    contrast = [cv2.Laplacian(picture[330:374, 330:374], cv2.CV_64F).std() for picture in (sharp, smeared)]
     assert contrast[1] < 0.9 * contrast[0]
 
 
