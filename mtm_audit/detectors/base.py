@@ -47,18 +47,27 @@ class Detector(Protocol):
         """One reading for each codebook; raises MtmError when the recording is too short for a window."""
         ...
 
+    def posteriors(self, reading: Reading, decoys: Sequence[Reading]) -> Floats:
+        """Probability of each symbol at each position given that a message is there: shape (positions, M)."""
+        ...
+
 
 def whole_windows(glimpse: Glimpse, timing: Timing, window_ticks: int, *, backwards: bool) -> NDArray[np.int64]:
-    """Numbers of the windows that lie wholly inside the recording, counted from the onset.
+    """Numbers of the windows that lie inside the recording, counted from the onset; empty when there is none.
 
     With `backwards` windows before the onset count as well (negative numbers): the message had begun earlier.
-    A window may stick out by a tenth of a tick.
+    Where no window lies wholly inside, the first one counts if three quarters of it do (a slow candidate rate
+    stretches the message beyond a recording that just holds it).
     """
     length_s = window_ticks / timing.rate_hz
     slack_s = 0.1 / timing.rate_hz
-    first = np.ceil((glimpse.edges_s[0] - slack_s - timing.onset_s) / length_s)
-    last = np.floor((glimpse.edges_s[-1] + slack_s - timing.onset_s) / length_s)
-    return np.arange(int(first) if backwards else max(0, int(first)), max(int(last), int(first)))
+    first = int(np.ceil((glimpse.edges_s[0] - slack_s - timing.onset_s) / length_s))
+    last = int(np.floor((glimpse.edges_s[-1] + slack_s - timing.onset_s) / length_s))
+    windows = np.arange(first if backwards else max(0, first), max(last, first))
+    if len(windows):
+        return windows
+    seen_s = min(glimpse.edges_s[-1], timing.onset_s + length_s) - max(glimpse.edges_s[0], timing.onset_s)
+    return np.arange(1) if seen_s >= 0.75 * length_s else np.arange(0)
 
 
 def combine_repeats(window_scores: Floats, positions: NDArray[np.int64], count: int) -> Floats:

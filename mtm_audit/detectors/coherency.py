@@ -44,6 +44,21 @@ class CoherencyDetector:
         ]
         return self._score_group(codebooks, timings, channel, axes, searched=True)
 
+    def posteriors(self, reading: Reading, decoys: Sequence[Reading]) -> Floats:
+        """Posteriors under a Gaussian shift: a sent symbol's score lies higher than a null score by a common amount.
+
+        Mean and spread of null scores come from the decoys, position by position; the shift is what the best
+        candidates show over all positions of the channel.
+        """
+        null = np.stack([decoy.scores for decoy in decoys])
+        centre = null.mean(axis=(0, 2))
+        variance = null.var(axis=(0, 2))
+        shift = max(0.0, float(np.mean(reading.scores.max(axis=1) - centre)))
+        logs = shift * (reading.scores - centre[:, None]) / np.maximum(variance, 1e-12)[:, None]
+        weights = np.exp(logs - logs.max(axis=1, keepdims=True))
+        posteriors: Floats = weights / weights.sum(axis=1, keepdims=True)
+        return posteriors
+
     def _score_group(
         self,
         codebooks: Sequence[Codebook],

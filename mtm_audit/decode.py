@@ -1,0 +1,164 @@
+"""From tracks to a verdict: assignment, glimpses, readings under the key and its decoys, symbols, message."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mtm_audit.assignment import assign_tracks
+from mtm_audit.detectors import make_detector
+from mtm_audit.detectors.base import Detector, Reading
+from mtm_audit.glimpse import Glimpse, glimpse_of_track
+from mtm_audit.tracks import Floats, Track
+from mtm_audit.verdict import Evidence, VerdictName, decoy_codebooks, weigh
+from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.framing import number_of_symbols
+from mtm_onboard.protocol.key import Key
+from mtm_onboard.protocol.scheme import Channel, Scheme
+
+# A symbol is certain when its posterior probability is at least this.
+CERTAIN = 0.95
+
+
+@dataclass(frozen=True)
+class DecodeSettings:
+    """How to decode: `onset_s` None searches for the message's start; `assignment` maps bodies to track names."""
+
+    detector: str = "coherency"
+    onset_s: float | None = None
+    decoys: int = 40
+    threshold: float = 1e-4
+    assignment: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ChannelDecoding:
+    """What one channel's motion said; `glimpse` and `reading` are None when no track shows its body.
+
+    `posteriors` (positions, M): probability of each symbol at each of the channel's positions, given that a message
+    is there.
+    """
+
+    channel: Channel
+    glimpse: Glimpse | None
+    reading: Reading | None
+    posteriors: Floats
+
+
+@dataclass(frozen=True)
+class Decoding:
+    """The answer, and all it rests on.
+
+    `symbols` has one entry a message position (None where nothing shows it), `posteriors` (L, M) the probabilities
+    behind them. `message` is the number they spell, given only with the verdict "decoded".
+    """
+
+    verdict: VerdictName
+    message: int | None
+    symbols: tuple[int | None, ...]
+    posteriors: Floats
+    evidence: Evidence
+    channels: tuple[ChannelDecoding, ...]
+    key_id: str
+    scheme: Scheme
+    settings: DecodeSettings
+
+    @property
+    def uncertain(self) -> tuple[int, ...]:
+        """Message positions whose symbol is missing or less than `CERTAIN`."""
+        return tuple(
+            place
+            for place, symbol in enumerate(self.symbols)
+            if symbol is None or self.posteriors[place, symbol] < CERTAIN
+        )
+
+
+def decode_tracks(
+    tracks: Sequence[Track], key: Key, settings: DecodeSettings, progress: Callable[[str, float], None] | None = None
+) -> Decoding:
+    """Decode a message from tracks under a key.
+
+    `progress(stage, fraction)` is called now and then. Raises MtmError when no channel can be read at all.
+    """
+    scheme = key.scheme
+    detector = make_detector(settings.detector)
+    bodies = assign_tracks(scheme, tracks, settings.assignment)
+    glimpses = {body: glimpse_of_track(track) for body, track in bodies.items() if track is not None}
+    codebooks = [key.codebook(), *decoy_codebooks(key, settings.decoys)]
+    channels, strengths, refusals = [], np.zeros(len(codebooks)), []
+    for number, channel in enumerate(scheme.channels):
+        if progress is not None:
+            progress(f"reading {channel.name}", number / len(scheme.channels))
+        glimpse = glimpses.get(channel.body)
+        try:
+            readings = None if glimpse is None else detector.read(codebooks, channel, glimpse, settings.onset_s)
+        except MtmError as refusal:
+            refusals.append(refusal)
+            readings = None
+        if readings is not None:
+            strengths += [reading.strength for reading in readings]
+        channels.append(_channel_decoding(detector, channel, glimpse, readings, scheme))
+    read = [decoding for decoding in channels if decoding.reading is not None]
+    if not read:
+        raise refusals[0] if refusals else MtmError("no channel of the scheme is in the recording")
+    maxima = sum(len(decoding.posteriors) for decoding in read)
+    evidence = weigh(strengths[0] / len(read), strengths[1:] / len(read), maxima)
+    posteriors, symbols = _message_symbols(scheme, channels)
+    return _decoding(key, settings, tuple(channels), symbols, posteriors, evidence)
+
+
+def _decoding(
+    key: Key,
+    settings: DecodeSettings,
+    channels: tuple[ChannelDecoding, ...],
+    symbols: tuple[int | None, ...],
+    posteriors: Floats,
+    evidence: Evidence,
+) -> Decoding:
+    def answer(verdict: VerdictName, message: int | None) -> Decoding:
+        return Decoding(verdict, message, symbols, posteriors, evidence, channels, key.id, key.scheme, settings)
+
+    if evidence.p_value > settings.threshold:
+        return answer("absent", None)
+    undecided = answer("inconclusive", None)
+    if undecided.uncertain:
+        return undecided
+    message = number_of_symbols([symbol for symbol in symbols if symbol is not None], key.scheme)
+    return undecided if message is None else answer("decoded", message)
+
+
+def _channel_decoding(
+    detector: Detector, channel: Channel, glimpse: Glimpse | None, readings: list[Reading] | None, scheme: Scheme
+) -> ChannelDecoding:
+    if readings is None:
+        unknown = np.full((channel.symbols, scheme.alphabet_size), 1.0 / scheme.alphabet_size)
+        return ChannelDecoding(channel, glimpse, None, unknown)
+    return ChannelDecoding(channel, glimpse, readings[0], detector.posteriors(readings[0], readings[1:]))
+
+
+def _message_symbols(scheme: Scheme, channels: Sequence[ChannelDecoding]) -> tuple[Floats, tuple[int | None, ...]]:
+    """Posteriors (L, M) and decisions of the message's positions: joined when split, pooled when the same."""
+    if scheme.combine == "split":
+        posteriors = np.concatenate([decoding.posteriors for decoding in channels])
+        seen = [decoding.reading is not None for decoding in channels for _ in range(decoding.channel.symbols)]
+        best = np.argmax(posteriors, axis=1)
+        return posteriors, tuple(int(symbol) if known else None for symbol, known in zip(best, seen, strict=True))
+    read = [decoding for decoding in channels if decoding.reading is not None]
+    logs = np.sum([np.log(np.maximum(decoding.posteriors, 1e-300)) for decoding in read], axis=0)
+    posteriors = np.exp(logs - logs.max(axis=1, keepdims=True))
+    posteriors /= posteriors.sum(axis=1, keepdims=True)
+    return posteriors, tuple(_pooled(scheme, read))
+
+
+def _pooled(scheme: Scheme, read: Sequence[ChannelDecoding]) -> list[int]:
+    """The paper's pooling of channels that carry the same symbols: mean score, or majority vote (mean breaks ties)."""
+    scores = np.mean([decoding.reading.scores for decoding in read if decoding.reading is not None], axis=0)
+    if scheme.pooling == "mean":
+        return [int(symbol) for symbol in np.argmax(scores, axis=1)]
+    votes = np.zeros_like(scores)
+    for decoding in read:
+        if decoding.reading is not None:
+            np.add.at(votes, (np.arange(len(votes)), np.argmax(decoding.reading.scores, axis=1)), 1.0)
+    span = np.ptp(scores, axis=1, keepdims=True)
+    ranked = votes + 0.5 * (scores - scores.min(axis=1, keepdims=True)) / np.maximum(span, 1e-300)
+    return [int(symbol) for symbol in np.argmax(ranked, axis=1)]

@@ -1,0 +1,58 @@
+"""The verdict: how unlikely the evidence would be if no message of this key were there."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy import stats
+
+from mtm_audit.tracks import Floats
+from mtm_onboard.protocol.codebook import Codebook
+from mtm_onboard.protocol.key import Key
+from mtm_onboard.protocol.keystream import SECRET_BYTES, stream
+
+VerdictName = Literal["decoded", "absent", "inconclusive"]
+
+# Skewness of the Gumbel distribution, the limit of a maximum over many candidates.
+_GUMBEL_SKEW = 1.1395
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The key's strength beside that of its decoys, and the p-value that follows."""
+
+    strength: float
+    decoy_strengths: Floats
+    p_value: float
+
+
+def decoy_codebooks(key: Key, count: int) -> list[Codebook]:
+    """Codebooks of keys that nobody holds, derived from this key so that every decode of a file says the same."""
+    return [
+        Codebook(stream(key.secret, "decoy", (number,), SECRET_BYTES), key.scheme, key.scheme.epoch)
+        for number in range(count)
+    ]
+
+
+def weigh(strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:
+    """Compare the key's strength with its decoys'.
+
+    Strengths are means of `maxima` maxima over candidates, so under the null they follow a Gumbel-like law whose
+    skewness shrinks with the square root of that number. Location and scale are fitted to the decoys; that they
+    are estimates from n decoys is paid for by Student's t with n - 1 degrees of freedom.
+    """
+    count = len(decoy_strengths)
+    centre, spread = float(np.mean(decoy_strengths)), float(np.std(decoy_strengths, ddof=1))
+    standard = (strength - centre) / max(spread, 1e-300)
+    skew = _GUMBEL_SKEW / np.sqrt(max(1, maxima))
+    normal = _normal_of_skewed(standard, skew)
+    p_value = float(stats.t.sf(normal / np.sqrt(1.0 + 1.0 / count), count - 1))
+    return Evidence(strength, decoy_strengths, p_value)
+
+
+def _normal_of_skewed(standard: float, skew: float) -> float:
+    """The standard normal quantile of the same probability as `standard` under a Pearson III law of that skew."""
+    upper = stats.pearson3.sf(standard, skew)
+    if 1e-290 < upper < 1.0:
+        return float(stats.norm.isf(upper))
+    return float(np.clip(standard, -37.0, 37.0))
