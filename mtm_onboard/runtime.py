@@ -1,11 +1,29 @@
 """The runtime: what happens in one tick, from the newest base command to the robot."""
 
+from typing import Protocol
+
 from mtm_onboard.guard import Guard
 from mtm_onboard.journal import Journal
-from mtm_onboard.modulator import Modulator
+from mtm_onboard.motion import BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.source import Source
 from mtm_onboard.transports.base import Transport
+
+
+class NoiseAdder(Protocol):
+    """What the runtime needs of a `Modulator`, or of whatever takes its place."""
+
+    def require_body_axes(self) -> None:
+        """Raise MtmError when the channel has an axis that no body velocity has."""
+        ...
+
+    def add(self, tick: int, base: BodyVelocity) -> BodyVelocity:
+        """`base` with this tick's noise added."""
+        ...
+
+    def prepare(self, tick: int) -> None:
+        """Compute ahead what the ticks after `tick` need; called after the send."""
+        ...
 
 
 class Runtime:
@@ -16,7 +34,7 @@ class Runtime:
 
     def __init__(
         self,
-        modulator: Modulator | None,
+        modulator: NoiseAdder | None,
         guard: Guard,
         source: Source,
         transport: Transport,

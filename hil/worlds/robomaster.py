@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mtm_onboard.motion import BodyVelocity
+from mtm_onboard.protocol import Channel, Scheme
 
 ROBOTS = 4
 BASE_SPEED_MPS = 0.5
@@ -23,6 +24,13 @@ _SWEEP_M = 2.4
 _FIRST_Y_M = -1.9
 _RISE_M = 0.5
 _TARGET_Y_M = 2.0
+
+
+def fleet_scheme(message_ticks: int = 600) -> Scheme:
+    """The paper's scheme for this world, and the key generator's preset `robomaster-fleet`: M = 4, split, sigma 0.1."""
+    names = [f"robot{number}" for number in range(ROBOTS)]
+    channels = tuple(Channel(name, name, ("vx", "vy"), 1, 0.1) for name in names)
+    return Scheme("robomaster-fleet", 50.0, (0.5, 5.0), 4, message_ticks, channels)
 
 
 @dataclass(frozen=True)

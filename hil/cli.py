@@ -1,0 +1,92 @@
+"""The command line: `mtm-hil <command>`. Exit codes: 0 done, 1 error, 2 usage, 130 interrupted."""
+
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Never
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+app = typer.Typer(
+    help="Robots that send messages through motion, simulated with the real onboard software in the loop.",
+    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False,
+)  # fmt: skip
+
+
+class WireName(StrEnum):
+    """What lies between the onboard software and a simulated robot."""
+
+    CAN = "can"
+    DIRECT = "direct"
+
+
+class CameraName(StrEnum):
+    """Keys of `hil.cameras.CAMERAS`, repeated so that --help need not load OpenCV."""
+
+    OVERHEAD = "overhead"
+    TILTED = "tilted"
+    PHONE = "phone"
+
+
+@app.callback()
+def _every_command() -> None:
+    pass
+
+
+@app.command()
+def record(
+    out: Annotated[Path, typer.Option(help="The folder to make; it must not exist.")],
+    message: Annotated[int | None, typer.Option(metavar="N", help="The message as a number.")] = None,
+    no_message: Annotated[bool, typer.Option("--no-message", help="Move without a message.")] = False,
+    seconds: Annotated[float, typer.Option(help="Length of the recording.")] = 26.0,
+    key: Annotated[Path | None, typer.Option(help="The key file; one is made in the folder without it.")] = None,
+    wire: Annotated[
+        WireName, typer.Option(help="The whole CAN protocol, or the same motion without it.")
+    ] = WireName.CAN,
+    seed: Annotated[int, typer.Option(min=0, help="Decides everything random but the message's waveforms.")] = 0,
+    camera: Annotated[CameraName, typer.Option(help="Which camera films.")] = CameraName.OVERHEAD,
+    no_video: Annotated[bool, typer.Option("--no-video", help="Motion capture alone.")] = False,
+) -> None:
+    """Record four simulated robots: motion capture, video, and what was sent."""
+    if (message is None) != no_message:
+        raise typer.BadParameter("give either --message N or --no-message")
+    with _reported() as console:
+        from hil.commands.record import RecordOptions
+        from hil.commands.record import record as run
+
+        film = None if no_video else camera.value
+        run(RecordOptions(out, seconds, message, key, wire.value, seed, film), console)
+
+
+@contextmanager
+def _reported() -> Iterator["Console"]:
+    """Turn errors into one sentence and an exit code; a request to terminate unwinds like any other exception."""
+    from rich.console import Console
+
+    from mtm_onboard.protocol import MtmError
+
+    former = signal.signal(signal.SIGTERM, _terminated)
+    try:
+        yield Console()
+    except MtmError as error:
+        print(f"mtm-hil: {error}", file=sys.stderr)
+        raise typer.Exit(1) from error
+    except KeyboardInterrupt as error:
+        raise typer.Exit(130) from error
+    finally:
+        signal.signal(signal.SIGTERM, former)
+
+
+def _terminated(*_: object) -> Never:
+    raise SystemExit(128 + signal.SIGTERM)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run one command; leaves through SystemExit with the exit code."""
+    app(args=arguments, prog_name="mtm-hil")

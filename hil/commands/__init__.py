@@ -1,0 +1,1 @@
+"""The commands of mtm-hil, one a file."""

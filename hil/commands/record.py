@@ -1,0 +1,55 @@
+"""`mtm-hil record`: drive the simulated robots and record them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+
+from hil.cameras import CAMERAS
+from hil.lockstep import run_lockstep
+from hil.newfolder import new_folder
+from hil.recording import Sensors, write_recording
+from hil.rig import RunSettings, Wire
+from hil.worlds.robomaster import fleet_scheme
+from mtm_onboard.protocol import generate_key, load_key, save_key
+from mtm_onboard.protocol.framing import symbols_of_number
+
+KEY_NAME = "robot.key"
+
+
+@dataclass(frozen=True)
+class RecordOptions:
+    """What the command line asked for; `message` None moves the robots without one, `key` None makes a key."""
+
+    out: Path
+    seconds: float
+    message: int | None
+    key: Path | None
+    wire: Wire
+    seed: int
+    camera: str | None
+
+
+def record(options: RecordOptions, console: Console) -> None:
+    """Write the recording folder, whole or not at all; raises MtmError when it exists or an option does not fit."""
+    key = generate_key("hil", fleet_scheme()) if options.key is None else load_key(options.key)
+    symbols = None if options.message is None else symbols_of_number(options.message, key.scheme)
+    sensors = Sensors(camera=None if options.camera is None else CAMERAS[options.camera])
+    settings = RunSettings(key, symbols, options.seconds, options.seed, options.wire)
+    with new_folder(options.out) as folder:
+        if options.key is None:
+            save_key(key, folder / KEY_NAME)
+        result = run_lockstep(settings)
+        frames = 0 if sensors.camera is None else int(options.seconds * sensors.camera.rate_hz)
+        with Progress(console=console, transient=True, disable=not (frames and console.is_terminal)) as progress:
+            task = progress.add_task("filming", total=frames)
+            write_recording(folder, settings, result, sensors, lambda done: progress.update(task, completed=done))
+    _say_what_was_recorded(options, settings)
+
+
+def _say_what_was_recorded(options: RecordOptions, settings: RunSettings) -> None:
+    sent = "no message" if options.message is None else f"message {options.message}, from {settings.start_s:g} s on"
+    print(f"{options.out}: {options.seconds:g} s of motion, {sent}")
+    if options.key is None:
+        print(f"the key is {options.out / KEY_NAME}; keep it secret")

@@ -1,0 +1,172 @@
+"""A run in simulated time: the onboard runtime of every robot, its wire and its plant, in lockstep."""
+
+from array import array
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from hil.clock import SimulatedClock
+from hil.rig import LIMITS, SAMPLE_PERIOD_S, RobotReport, RunResult, RunSettings, seeds_of
+from hil.robots.can_line import can_line
+from hil.robots.can_node import CanMotionController
+from hil.robots.direct import DirectTransport
+from hil.robots.mecanum import MecanumPlant
+from hil.robots.motion_controller import MotionController
+from hil.sensors.poses import Floats, Trajectory
+from hil.worlds.robomaster import GoToGoal, Route, routes
+from mtm_onboard.guard import Guard, Staleness
+from mtm_onboard.loop import LoopStats, run_loop
+from mtm_onboard.motion import STOP
+from mtm_onboard.protocol import Channel
+from mtm_onboard.protocol.framing import channel_symbols
+from mtm_onboard.runtime import Runtime
+from mtm_onboard.source import HeldSource
+from mtm_onboard.transports.base import Transport
+from mtm_onboard.transports.robomaster_can import RoboMasterCan
+
+# After the last stop, so that it has crossed the wire.
+_SETTLING_S = 0.05
+
+
+@dataclass(frozen=True)
+class _Link:
+    """The wire to one robot: its transport, what its far end does each period, and what it found wrong."""
+
+    transport: Transport
+    poll: Callable[[float], None]
+    faults: Callable[[], int]
+
+
+@dataclass(frozen=True)
+class _Robot:
+    name: str
+    plant: MecanumPlant
+    controller: MotionController
+    link: _Link
+    task: GoToGoal
+    source: HeldSource
+    guard: Guard
+    runtime: Runtime
+
+    def step(self, tick: int, now_s: float) -> None:
+        """Command the base velocity for the present pose, then run the onboard tick."""
+        self.source.set(self.task.command(self.plant.position_xy_m, self.plant.heading_rad), now_s)
+        self.runtime.step(tick, now_s)
+
+    def report(self) -> RobotReport:
+        guard, controller = self.guard, self.controller
+        is_stopped = not controller.work_mode and controller.demand == STOP
+        return RobotReport(
+            self.name,
+            guard.clamped,
+            guard.stale,
+            guard.refused,
+            self.link.faults(),
+            controller.deadman_stops,
+            is_stopped,
+        )
+
+
+def run_lockstep(settings: RunSettings) -> RunResult:
+    """Run the world and return its motion; the same settings give the same result, bit for bit, over either wire.
+
+    Raises MtmError when a robot's link fails.
+    """
+    clock, scheme = SimulatedClock(), settings.key.scheme
+    robots = _robots(settings, clock)
+    poses = array("d")
+    polls = [(robot.link.poll, robot.plant) for robot in robots]
+
+    def poll(now_s: float) -> None:
+        for poll_one, plant in polls:
+            poll_one(now_s)
+            x_m, y_m = plant.position_xy_m
+            poses.extend((x_m, y_m, plant.heading_rad))
+
+    def step(tick: int, now_s: float) -> None:
+        for robot in robots:
+            robot.step(tick, now_s)
+
+    clock.every(SAMPLE_PERIOD_S, poll)
+    with _opened([robot.link.transport for robot in robots], clock):
+        stats = _loop(settings, clock, step)
+        clock.sleep_until(settings.seconds)
+        samples = len(poses)
+    clock.sleep_until(settings.seconds + _SETTLING_S)
+    motion = np.frombuffer(poses[:samples], dtype=np.float64).reshape(-1, len(robots), 3)
+    names = [channel.body for channel in scheme.channels]
+    return RunResult(_trajectories(names, motion), settings.start_s, stats, tuple(robot.report() for robot in robots))
+
+
+def _loop(settings: RunSettings, clock: SimulatedClock, step: Callable[[int, float], None]) -> LoopStats:
+    # A tick that falls on the very end would have no motion to show.
+    end_s = settings.seconds - 1e-6
+    return run_loop(
+        clock, settings.key.scheme.rate_hz, step, start_s=settings.start_s, stop=lambda: clock.now() >= end_s
+    )
+
+
+@contextmanager
+def _opened(transports: list[Transport], clock: SimulatedClock) -> Iterator[None]:
+    with ExitStack() as stack:
+        for transport in transports:
+            stack.enter_context(transport)
+            if isinstance(transport, RoboMasterCan):
+                clock.every(transport.service_period_s, transport.service)
+        yield
+
+
+def _robots(settings: RunSettings, clock: SimulatedClock) -> list[_Robot]:
+    seeds, scheme = seeds_of(settings.seed), settings.key.scheme
+    parts = None if settings.symbols is None else channel_symbols(settings.symbols, scheme)
+    each = zip(scheme.channels, seeds.slips, routes(seeds.permutation()), strict=True)
+    return [
+        _robot(settings, clock, channel, None if parts is None else parts[channel.name], slip_seed, route)
+        for channel, slip_seed, route in each
+    ]
+
+
+def _robot(
+    settings: RunSettings,
+    clock: SimulatedClock,
+    channel: Channel,
+    symbols: tuple[int, ...] | None,
+    slip_seed: int,
+    route: Route,
+) -> _Robot:
+    plant = MecanumPlant(settings.plant, slip_seed, route.start_xy_m)
+    controller = MotionController(plant)
+    link = _can_link(controller) if settings.wire == "can" else _direct_link(controller, clock)
+    source = HeldSource()
+    period_s = 1.0 / settings.key.scheme.rate_hz
+    guard = Guard(LIMITS, Staleness(), noise_sigma=channel.sigma, period_s=period_s)
+    modulator = None if symbols is None else settings.modulator(settings.key.codebook(), channel.name, symbols)
+    runtime = Runtime(modulator, guard, source, link.transport)
+    return _Robot(channel.body, plant, controller, link, GoToGoal(route), source, guard, runtime)
+
+
+def _can_link(controller: MotionController) -> _Link:
+    ours, theirs = can_line()
+    node, transport = CanMotionController(controller, theirs), RoboMasterCan(ours)
+
+    def faults() -> int:
+        wrong = node.faults + node.ignored_messages + node.malformed_messages + node.bus_errors
+        return (
+            wrong + transport.bus_errors + transport.refusals + transport.malformed_pushes + transport.missed_heartbeats
+        )
+
+    return _Link(transport, node.poll, faults)
+
+
+def _direct_link(controller: MotionController, clock: SimulatedClock) -> _Link:
+    return _Link(DirectTransport(controller, clock), controller.advance, lambda: controller.faults)
+
+
+def _trajectories(names: list[str], motion: Floats) -> tuple[Trajectory, ...]:
+    """From poses (samples, robots, 3)."""
+    times_s: Floats = np.arange(len(motion), dtype=np.float64) * SAMPLE_PERIOD_S
+    return tuple(
+        Trajectory(name, times_s, motion[:, robot, :2], motion[:, robot, 2]) for robot, name in enumerate(names)
+    )

@@ -1,0 +1,114 @@
+"""One run of the RoboMaster world: what is set, and what comes out of it.
+
+One integer seed decides everything random about a run except its waveforms, which come from the key alone.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from hil.robots.mecanum import MecanumParameters, calibrated_parameters
+from hil.sensors.poses import Trajectory
+from hil.worlds.robomaster import ROBOTS, random_permutation
+from mtm_onboard.guard import Limits
+from mtm_onboard.loop import LoopStats
+from mtm_onboard.modulator import Modulator
+from mtm_onboard.protocol import Codebook, Key, MtmError
+from mtm_onboard.protocol.framing import check_symbols
+from mtm_onboard.runtime import NoiseAdder
+
+Wire = Literal["can", "direct"]
+# Codebook, channel name and the channel's own symbols, as `Modulator` takes them.
+ModulatorFactory = Callable[[Codebook, str, Sequence[int]], NoiseAdder]
+
+SAMPLE_PERIOD_S = 0.01
+LIMITS = Limits(speed_mps=1.0, turn_rate_radps=2.0)
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """A run of `seconds`, whose message begins at `start_s` and repeats until the end.
+
+    `symbols` is the whole message, None when the robots move without one. `wire` "can" is the whole CAN protocol in
+    both directions, "direct" gives the same motion without it. `modulator` may put something else, such as the C shim,
+    in the place of the Python one. Raises MtmError when the key does not fit this world or the spans make no sense.
+    """
+
+    key: Key
+    symbols: tuple[int, ...] | None
+    seconds: float
+    seed: int
+    wire: Wire = "can"
+    start_s: float = 1.5
+    modulator: ModulatorFactory = Modulator
+    plant: MecanumParameters = field(default_factory=calibrated_parameters)
+
+    def __post_init__(self) -> None:
+        scheme = self.key.scheme
+        if len(scheme.channels) != ROBOTS:
+            raise MtmError(
+                f"the key's scheme has {len(scheme.channels)} channels and this world {ROBOTS} robots; make a key "
+                "with mtm-onboard keygen --preset robomaster-fleet"
+            )
+        if len({channel.body for channel in scheme.channels}) != ROBOTS:
+            raise MtmError("two channels of the key's scheme move the same body; give each robot one channel")
+        if not 0.0 <= self.start_s < self.seconds < np.inf:
+            raise MtmError(
+                f"the run lasts {self.seconds:g} s and its message begins at {self.start_s:g} s; make it last longer"
+            )
+        if self.symbols is not None:
+            check_symbols(self.symbols, scheme)
+        if self.seed < 0:
+            raise MtmError(f"the seed is {self.seed}; give a whole number from 0 on")
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """Independent random sources of one run: one of each robot's slip, one of the world, one of the sensors."""
+
+    slips: tuple[int, ...]
+    world: np.random.SeedSequence
+    sensors: np.random.SeedSequence
+
+    def permutation(self) -> tuple[int, ...]:
+        """Which target each robot drives to in the end."""
+        return random_permutation(np.random.default_rng(self.world))
+
+
+def seeds_of(seed: int) -> Seeds:
+    """The sources that one integer gives."""
+    slips, world, sensors = np.random.SeedSequence(seed).spawn(3)
+    return Seeds(tuple(int(word) for word in slips.generate_state(ROBOTS, np.uint64)), world, sensors)
+
+
+@dataclass(frozen=True)
+class RobotReport:
+    """Counters of one robot: the guard's, in ticks, and what its motion controller found wrong."""
+
+    name: str
+    clamped: int
+    stale: int
+    refused: int
+    faults: int
+    deadman_stops: int
+    is_stopped: bool
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether nothing went wrong and the motors were off after the run; clamping is no fault."""
+        return self.is_stopped and not (self.stale or self.refused or self.faults or self.deadman_stops)
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """The true motion at 100 Hz from the start on, when the message began, and how loop and robots fared.
+
+    `stats.sent` is the number of commands that each robot was sent.
+    """
+
+    trajectories: tuple[Trajectory, ...]
+    onset_s: float
+    stats: LoopStats
+    robots: tuple[RobotReport, ...]
