@@ -113,7 +113,7 @@ class Painter:
             maps = _texel_maps(coarse, poses[len(poses) // 2], self._shadow.shape, textures.TEXELS_PER_M)
             dark = cv2.remap(self._shadow, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR)
             light = 1 - cv2.resize(dark, (columns.stop - columns.start, rows.stop - rows.start))
-            picture[wide] = picture[wide] * light[:, :, None] + 0.5
+            picture[wide] = cv2.multiply(picture[wide], cv2.cvtColor(light, cv2.COLOR_GRAY2BGR), dtype=cv2.CV_8U)
 
     def _draw_robot(
         self, under: NDArray[np.float32], region: tuple[slice, slice], top: Image, pose: Floats

@@ -65,7 +65,7 @@ def test_tracking_a_video_takes_at_most_half_its_length(tmp_path, benchmark, nam
     assert ratio is None or ratio >= 2
 
 
-def test_filming_takes_at_most_a_third_of_the_time_filmed(tmp_path, benchmark):
+def test_filming_takes_at_most_half_of_the_time_filmed(tmp_path, benchmark):
     benchmark.pedantic(record, args=(tmp_path / "film.mp4", Scene()), rounds=3)
     ratio = times_real_time(benchmark, "filming")
-    assert ratio is None or ratio >= 3
+    assert ratio is None or ratio >= 2
