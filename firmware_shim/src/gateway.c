@@ -155,7 +155,7 @@ static void command_passed(mtm_gateway *gateway)
     gateway->head.sequence = mtm_u16(message + 6);
     gateway->head.attributes = message[8];
     gateway->armed = 1;
-    (void)mtm_guard_accept(gateway->shim, &gateway->arriving);
+    mtm_guard_accept(gateway->shim, &gateway->arriving);
 }
 
 static void message_passed(mtm_gateway *gateway)

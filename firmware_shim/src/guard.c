@@ -55,20 +55,19 @@ void mtm_guard_age(mtm_shim *shim, uint32_t elapsed_us)
     }
 }
 
-uint8_t mtm_guard_accept(mtm_shim *shim, const mtm_velocity *base)
+void mtm_guard_accept(mtm_shim *shim, const mtm_velocity *base)
 {
     uint32_t axis;
     for (axis = 0; axis < MTM_AXES; axis++) {
         if (base->axis[axis] == MTM_Q20_INVALID) {
             mtm_count(&shim->counts.refused_commands);
-            return 0;
+            return;
         }
     }
     for (axis = 0; axis < MTM_AXES; axis++) {
         shim->base.axis[axis] = mtm_limited(base->axis[axis], shim->limit[axis], &shim->counts.base_clamps);
     }
     shim->age_us = 0;
-    return 1;
 }
 
 uint8_t mtm_guard_fresh(const mtm_shim *shim)

@@ -17,7 +17,7 @@ mtm_q20 mtm_limited(mtm_q20 value, mtm_q20 limit, uint32_t *clamps);
 mtm_q20 mtm_faded(mtm_q20 value, uint32_t gain);
 uint8_t mtm_settings_good(const mtm_settings *settings);
 void mtm_guard_age(mtm_shim *shim, uint32_t elapsed_us);
-uint8_t mtm_guard_accept(mtm_shim *shim, const mtm_velocity *base);
+void mtm_guard_accept(mtm_shim *shim, const mtm_velocity *base);
 uint8_t mtm_guard_fresh(const mtm_shim *shim);
 uint32_t mtm_guard_gain(const mtm_shim *shim);
 

@@ -148,7 +148,7 @@ void mtm_shim_tick(mtm_shim *shim, uint32_t now_us, const mtm_velocity *base, mt
 {
     mtm_advance(shim, now_us);
     if (base != NULL) {
-        (void)mtm_guard_accept(shim, base);
+        mtm_guard_accept(shim, base);
     }
     mtm_output(shim, out);
 }
