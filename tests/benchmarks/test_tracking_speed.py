@@ -16,7 +16,7 @@ from hil.sensors.video import write_video
 from mtm_audit.recordings.load import load_tracks
 
 pytestmark = pytest.mark.benchmark(timer=time.process_time)
-SECONDS = 8.0
+SECONDS = 5.0
 COLOURS_BGR = ((255, 255, 0), (255, 0, 255), (0, 230, 230), (30, 30, 230))
 
 
