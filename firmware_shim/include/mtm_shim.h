@@ -94,7 +94,7 @@ typedef struct {
     uint32_t image_bytes_max; /* larger images are refused */
     uint32_t hold_ms;         /* age of the last command at which the noise ends and decay begins: 1 to 9999, say 100 */
     uint32_t zero_ms;         /* age at which the output is zero: hold_ms + 1 to 10000, say 250 */
-    mtm_q20 limit[MTM_AXES];  /* largest magnitude of a command, 0 to 2^30. An image may lower it, until the next image */
+    mtm_q20 limit[MTM_AXES];  /* largest magnitude of a command, 0 to 2^30; an image may lower it until the next one */
 } mtm_settings;
 
 /* Events since mtm_shim_init; each stays at its largest value instead of wrapping. */
@@ -205,12 +205,12 @@ typedef struct {
 
 /* The hardware, behind five callbacks. None may block. */
 typedef struct {
-    void *context;                                                               /* given to each callback */
-    uint32_t (*now_us)(void *context);                                           /* free-running timer */
-    uint8_t (*receive)(void *context, uint8_t side, mtm_frame *frame);           /* 0: nothing has arrived */
-    uint8_t (*send)(void *context, uint8_t side, const mtm_frame *frame);        /* 0: no room, offered again later */
-    uint8_t (*stop_pressed)(void *context);                                      /* 1: the operator says stop (latched here) */
-    void (*status)(void *context, const mtm_shim *shim);                         /* end of every poll: feed the watchdog */
+    void *context;                                                        /* given to each callback */
+    uint32_t (*now_us)(void *context);                                    /* free-running timer */
+    uint8_t (*receive)(void *context, uint8_t side, mtm_frame *frame);    /* 0: nothing has arrived */
+    uint8_t (*send)(void *context, uint8_t side, const mtm_frame *frame); /* 0: no room, offered again later */
+    uint8_t (*stop_pressed)(void *context);                               /* 1: the operator says stop; latched here */
+    void (*status)(void *context, const mtm_shim *shim);                  /* end of every poll: feed the watchdog */
 } mtm_board;
 
 /* What the gateway does with the companion's stream (CAN id 0x201). A speed command is set 3F, id 21, 12 bytes of
@@ -225,7 +225,7 @@ typedef struct {
  *   NaN or an infinity leaves with the last good values in their place, fading as any stale command does.
  * - When commands stay away for hold_ms, or stop is latched, the gateway sends speed commands itself, one each tick:
  *   fading, then zero, until the companion's next; between two of its messages, or after 20 ms of waiting for the end
- *   of one, inside it (the robot then loses that message). Not before the first speed command, and not after wheel speed
+ *   of one, inside it (the robot then loses that message). Not before the first speed command, nor after wheel speed
  *   (3F/20), follow speed (3F/22), position move (3F/25) or work mode 0 (3F/19), unless stop is latched.
  * - While stop is latched the three other motion commands leave with a spoilt CRC16, so that the robot ignores them.
  * - `fill`: send base and noise each tick, between the companion's own commands, so that the waveform keeps its

@@ -33,6 +33,7 @@ struct reference {
 
 static uint32_t failures;
 static uint32_t worst_tick, worst_poll, worst_tick_stack, worst_poll_stack, overhead;
+static uint32_t worst_message;
 static uint64_t all_ticks;
 static uint32_t tick_calls;
 
@@ -169,6 +170,28 @@ static void test_messages(void)
     expect(found == DUML_MESSAGES, "messages found", found);
 }
 
+/* The most work that one byte can cause: it completes a message with a wrong checksum that is made of headers, each of
+ * which promises a message that ends here too. */
+static void test_worst_message(void)
+{
+    static mtm_duml_parser parser;
+    uint8_t header[4] = {0x55, 0, 0, 0};
+    uint32_t before = 0;
+    uint32_t at;
+    mtm_duml_init(&parser);
+    for (at = 0; at < MTM_DUML_MAX_BYTES; at++) {
+        const uint32_t length = MTM_DUML_MAX_BYTES - (at & ~3u);
+        header[1] = (uint8_t)length;
+        header[2] = (uint8_t)(4u | length >> 8);
+        header[3] = mtm_crc8(header, 3);
+        mtm_duml_push(&parser, header[at & 3u]);
+        before = port_instructions();
+        expect(mtm_duml_take(&parser) == 0, "message of headers", at);
+    }
+    worst_message = port_instructions() - before;
+    expect(parser.count < MTM_DUML_OVERHEAD, "bytes left of it", parser.count);
+}
+
 /* ---- A board in memory ---- */
 
 static struct {
@@ -265,11 +288,13 @@ int main(void)
     mean = tick_calls > 0 ? (uint32_t)all_ticks / tick_calls : 0;
     test_worst_case();
     test_messages();
+    test_worst_message();
     test_gateway();
     if (worst_tick > 0) {
         say_number("instructions per tick, mean: ", mean);
         say_number("instructions per tick, worst: ", worst_tick);
         say_number("instructions per gateway poll with one frame, worst: ", worst_poll);
+        say_number("instructions to give up 1023 bytes made of headers: ", worst_message);
         say_number("stack of a tick, bytes: ", worst_tick_stack);
         say_number("stack of a gateway poll, bytes: ", worst_poll_stack);
         say_number("state of the playing core, bytes: ", sizeof(mtm_shim));
