@@ -1,0 +1,128 @@
+"""The command line: `mtm-audit <command>`.
+
+Exit codes of `decode`: 0 decoded, 3 absent, 4 inconclusive, 1 error, 2 usage, 130 interrupted.
+"""
+
+import math
+import os
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Never
+
+import typer
+
+app = typer.Typer(
+    help="Find out what a robot said with its motion: from a recording and a key to a verdict.",
+    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+)  # fmt: skip
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(f"mtm-audit {version('mtm')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _every_command(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def decode(
+    paths: Annotated[
+        list[Path], typer.Argument(metavar="PATH", help="A video, motion-capture files, or a folder of those.")
+    ],
+    key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
+    onset: Annotated[
+        str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
+    ] = "auto",
+    tracker: Annotated[
+        str, typer.Option(metavar="NAME", help="How to find robots in a video: aruco, or colour:NAME,...")
+    ] = "aruco",
+    assign: Annotated[
+        list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
+    ] = None,
+    detector: Annotated[str, typer.Option(metavar="NAME", help="How to look for the noise.")] = "coherency",
+    decoys: Annotated[int, typer.Option(min=8, help="Keys that nobody holds, to compare with.")] = 40,
+    threshold: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="Largest p-value that still counts as a message.")
+    ] = 1e-4,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON (docs/decode-json.md) instead of a table.")
+    ] = False,
+) -> None:
+    """Decode the message in a recording.
+
+    Exit codes: 0 decoded, 3 no message of this key, 4 inconclusive, 1 error, 2 usage, 130 interrupted.
+    """  # fmt: skip
+    onset_s, pairs = _onset_s(onset), _pairs(assign or [])
+    with _reported():
+        from mtm_audit.commands.decode import DecodeOptions, run_decode
+        from mtm_audit.decode import DecodeSettings
+
+        settings = DecodeSettings(detector, onset_s, decoys, threshold, pairs)
+        code = run_decode(DecodeOptions(tuple(paths), key, tracker, settings, as_json))
+    raise typer.Exit(code)
+
+
+def _onset_s(text: str) -> float | None:
+    if text == "auto":
+        return None
+    try:
+        onset_s = float(text)
+    except ValueError:
+        onset_s = math.nan
+    if not math.isfinite(onset_s):
+        raise typer.BadParameter(f"{text!r} is neither a number of seconds nor auto", param_hint="--onset")
+    return onset_s
+
+
+def _pairs(texts: Sequence[str]) -> dict[str, str]:
+    pairs: dict[str, str] = {}
+    for text in texts:
+        body, equals, track = text.partition("=")
+        if not (body and equals and track):
+            raise typer.BadParameter(f"{text!r} is not BODY=TRACK, such as robot0=marker3", param_hint="--assign")
+        if body in pairs:
+            raise typer.BadParameter(f"{body!r} is given two tracks; give it one", param_hint="--assign")
+        pairs[body] = track
+    return pairs
+
+
+@contextmanager
+def _reported() -> Iterator[None]:
+    """Turn errors into one sentence and an exit code; a request to terminate unwinds like any other exception."""
+    from mtm_onboard.protocol.errors import MtmError
+
+    former = signal.signal(signal.SIGTERM, _terminated)
+    try:
+        yield
+    except MtmError as error:
+        print(f"mtm-audit: {error}", file=sys.stderr)
+        raise typer.Exit(1) from error
+    except KeyboardInterrupt as error:
+        print("mtm-audit: interrupted; nothing was written", file=sys.stderr)
+        raise typer.Exit(130) from error
+    finally:
+        signal.signal(signal.SIGTERM, former)
+
+
+def _terminated(*_: object) -> Never:
+    raise SystemExit(128 + signal.SIGTERM)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run one command; leaves through SystemExit with the exit code."""
+    # Many small products: threads cost twenty times what they save when the machine is busy. Must come before numpy.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    app(args=arguments, prog_name="mtm-audit")

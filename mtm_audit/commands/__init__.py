@@ -1,0 +1,1 @@
+"""The commands of mtm-audit, one a file."""

@@ -1,0 +1,140 @@
+"""The decode as a person reads it: verdict first, then what it rests on."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from rich.console import Console, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from mtm_audit.advice import advice
+from mtm_audit.decode import CERTAIN, ChannelDecoding, Decoding
+from mtm_audit.recordings.recording import Recording
+from mtm_onboard.protocol.framing import payload_bits
+
+_COLOURS = {"decoded": "bold green", "absent": "bold red", "inconclusive": "bold yellow"}
+
+
+def print_report(console: Console, recording: Recording, decoding: Decoding, warnings: Sequence[str]) -> None:
+    """Print verdict, evidence, channels and warnings."""
+    console.print(_report(recording, decoding, warnings), highlight=False)
+
+
+def verdict_sentence(decoding: Decoding) -> str:
+    """The verdict in one line."""
+    if decoding.verdict == "decoded" and decoding.message is not None:
+        return f"decoded: message {decoding.message} ({message_bits(decoding)})"
+    if decoding.verdict == "absent":
+        return f"absent: no message of key {decoding.key_id} was found in this recording"
+    return "inconclusive: a message of this key is there, but not all of it could be read"
+
+
+def message_bits(decoding: Decoding) -> str | None:
+    """The message as a binary number with all its digits, `0b...`; None unless decoded."""
+    return None if decoding.message is None else f"0b{decoding.message:0{payload_bits(decoding.scheme)}b}"
+
+
+def chance_sentence(decoding: Decoding) -> str:
+    """The p-value in words, and what it is estimated from."""
+    evidence = decoding.evidence
+    return (
+        f"About {rarity(evidence.p_value)} recordings without a message of this key would look like this, judged by "
+        f"{len(evidence.decoy_strengths)} decoy keys; the limit is {rarity(decoding.settings.threshold)}."
+    )
+
+
+def rarity(probability: float) -> str:
+    """A probability as "43 in 100", "1 in 2,500" or "1 in 3e14"."""
+    if probability >= 0.01:
+        return f"{100.0 * probability:.0f} in 100"
+    if probability <= 0.0:
+        return "0 in 100"
+    odds = 1.0 / probability
+    return f"1 in {odds:,.0f}" if odds < 1e7 else f"1 in {odds:.0e}".replace("e+", "e")
+
+
+def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str]) -> RenderableType:
+    scheme = decoding.scheme
+    parts: list[RenderableType] = [
+        Text(verdict_sentence(decoding), style=_COLOURS[decoding.verdict]),
+        Text(chance_sentence(decoding)),
+        *(Text(sentence) for sentence in advice(recording, decoding)),
+        Text(""),
+        Text(f"key        {decoding.key_id}"),
+        Text(f"scheme     {scheme.name} (fingerprint {scheme.fingerprint})"),
+        Text(f"recording  {recording_line(recording)}"),
+        Text(""),
+        _absent_table(decoding) if decoding.verdict == "absent" else _symbol_table(decoding),
+    ]
+    parts += [Text(f"warning: {warning}", style="yellow") for warning in warnings]
+    return Group(*parts)
+
+
+def recording_line(recording: Recording) -> str:
+    """Kind, length and bodies of the recording in one line."""
+    rate_hz = recording.frame_rate_hz
+    rate = "" if rate_hz is None else f" at {rate_hz:.4g} a second"
+    what = "frames" if recording.kind == "video" else "samples"
+    names = ", ".join(track.name for track in recording.tracks)
+    return f"{recording.kind}, {recording.duration_s:.1f} s, {recording.frames} {what}{rate}, tracks: {names}"
+
+
+def _symbol_table(decoding: Decoding) -> Table:
+    table = _table("channel", "track", "start s", "rate Hz", "windows", "symbol", "sure", "best", "next", "margin")
+    for channel, first in _with_places(decoding):
+        reading, head = channel.reading, [channel.channel.name, _track_name(channel)]
+        if reading is None:
+            table.add_row(*head, "-", "-", "0", "-", "-", "-", "-", "-")
+            continue
+        head += [f"{reading.timing.onset_s:.2f}", f"{reading.timing.rate_hz:.2f}"]
+        for position in range(channel.channel.symbols):
+            windows = int(np.sum(reading.window_positions == position))
+            symbol = decoding.symbols[first + position]
+            posterior = 0.0 if symbol is None else float(decoding.posteriors[first + position, symbol])
+            best, runner_up = (float(score) for score in np.sort(reading.scores[position])[:-3:-1])
+            doubt = "" if posterior >= CERTAIN else " ?"
+            table.add_row(
+                *(head if position == 0 else [""] * len(head)),
+                str(windows), f"{symbol}{doubt}", percent(posterior),
+                f"{best:.3f}", f"{runner_up:.3f}", f"{best - runner_up:.3f}",
+            )  # fmt: skip
+    return table
+
+
+def _absent_table(decoding: Decoding) -> Table:
+    """Without symbols: those of a recording without a message would be chance, and would look like one."""
+    table = _table("channel", "track", "windows", "this key", "decoy keys")
+    for channel in decoding.channels:
+        windows = 0 if channel.reading is None else len(channel.reading.window_positions)
+        strength = "-" if channel.reading is None else f"{channel.reading.strength:.3f}"
+        table.add_row(channel.channel.name, _track_name(channel), str(windows), strength, "")
+    evidence = decoding.evidence
+    mean, spread = float(np.mean(evidence.decoy_strengths)), float(np.std(evidence.decoy_strengths, ddof=1))
+    table.add_section()
+    table.add_row("together", "", "", f"{evidence.strength:.3f}", f"{mean:.3f} ± {spread:.3f}")
+    return table
+
+
+def _with_places(decoding: Decoding) -> list[tuple[ChannelDecoding, int]]:
+    """Each channel with the place of its first symbol in the message."""
+    places, first = [], 0
+    for channel in decoding.channels:
+        places.append((channel, first))
+        first += channel.channel.symbols if decoding.scheme.combine == "split" else 0
+    return places
+
+
+def percent(probability: float) -> str:
+    """A posterior for reading: never rounded up to certainty."""
+    return "> 99.9 %" if probability > 0.999 else f"{100.0 * probability:.1f} %"
+
+
+def _track_name(channel: ChannelDecoding) -> str:
+    return "-" if channel.glimpse is None else channel.glimpse.name
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
+    for number, column in enumerate(columns):
+        table.add_column(column, justify="left" if number < 2 else "right", no_wrap=True)
+    return table
