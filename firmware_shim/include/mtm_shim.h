@@ -76,7 +76,6 @@ typedef enum {
 typedef struct {
     const uint8_t *bytes; /* NULL: no image */
     uint32_t ticks;       /* of all messages together */
-    uint32_t message_ticks;
     uint32_t step[MTM_AXES];
     mtm_q20 limit[MTM_AXES];
     uint32_t offset[MTM_AXES]; /* of the axis' first sample in bytes; 0: no samples */
@@ -128,8 +127,8 @@ typedef struct {
 mtm_result mtm_shim_init(mtm_shim *shim, const mtm_settings *settings);
 
 /* Hand over an image. It is checked here and refused before anything of it plays. With nothing playing it begins at
- * the next tick; otherwise at the message boundary where the active image ends (a repeating one ends with each
- * message). The bytes must stay unchanged while `active.bytes` or `pending.bytes` points to them, so a board with two
+ * the next tick; otherwise at the message boundary where the active image ends; a repeating one ends each time it has
+ * played. The bytes must stay unchanged while `active.bytes` or `pending.bytes` points to them, so a board with two
  * buffers fills the one that is neither. A third image is MTM_IMAGE_BUSY. */
 mtm_result mtm_shim_offer(mtm_shim *shim, const uint8_t *bytes, uint32_t size);
 
@@ -228,8 +227,8 @@ typedef struct {
  *   of one, inside it (the robot then loses that message). Not before the first speed command, nor after wheel speed
  *   (3F/20), follow speed (3F/22), position move (3F/25) or work mode 0 (3F/19), unless stop is latched.
  * - While stop is latched the three other motion commands leave with a spoilt CRC16, so that the robot ignores them.
- * - `fill`: send base and noise each tick, between the companion's own commands, so that the waveform keeps its
- *   time when the companion does not.
+ * - `fill`: send base and noise each tick, between the companion's own messages, so that the waveform keeps its
+ *   time when the companion does not. It finds room only with senders that begin each message in a frame of its own.
  * The controller's frames pass untouched. */
 typedef struct {
     uint32_t rewritten; /* speed commands that left with other values */

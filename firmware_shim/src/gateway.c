@@ -128,6 +128,18 @@ static void rewrite(mtm_gateway *gateway, uint32_t at, uint8_t *slot)
     }
 }
 
+/* Byte `at` of another motion command has arrived while stopped: its checksum becomes the opposite of the right one. */
+static void spoil(mtm_gateway *gateway, uint32_t at, uint8_t *slot)
+{
+    const uint32_t length = length_of(gateway->parser.bytes);
+    if (at + 2 >= length) {
+        *slot = (uint8_t)~(mtm_crc16(gateway->parser.bytes, length - 2) >> (at + 2 == length ? 0 : 8));
+    }
+    if (at + 1 == length) {
+        mtm_count(&gateway->counts.spoilt);
+    }
+}
+
 /* ---- Whole messages ---- */
 
 /* A command of our own is wanted now, not at the next tick. */
@@ -185,13 +197,7 @@ static void byte_arrived(mtm_gateway *gateway, uint8_t *slot)
     if (command) {
         rewrite(gateway, at, slot);
     } else if (at >= PAYLOAD && gateway->shim->stopped && is_other_motion(parser->bytes)) {
-        const uint32_t length = length_of(parser->bytes);
-        if (at + 2 >= length) {
-            *slot ^= 0xFFu;
-        }
-        if (at + 1 == length) {
-            mtm_count(&gateway->counts.spoilt);
-        }
+        spoil(gateway, at, slot);
     }
     while (mtm_duml_take(parser) != 0) {
         message_passed(gateway);

@@ -73,7 +73,6 @@ static mtm_result read_fields(mtm_image *image, const uint8_t *bytes, uint32_t s
     }
     image->bytes = bytes;
     image->ticks = message_ticks * messages;
-    image->message_ticks = message_ticks;
     image->repeats = bytes[7];
     used = read_axes(image, bytes);
     expected = MTM_IMAGE_HEADER_BYTES + (uint64_t)image->ticks * 2 * used + MTM_IMAGE_CRC_BYTES;

@@ -215,7 +215,9 @@ def test_while_stopped_other_motion_commands_reach_the_robot_unreadable(cmdid):
     passed = board.pass_on(aligned(motion), gap_us=0)
     assert len(stream(passed)) == len(motion)
     assert whole_messages(passed) == []
-    assert board.counts.spoilt == 1
+    inverted = motion[:-2] + bytes(0xFF ^ byte for byte in motion[-2:])
+    assert whole_messages(board.pass_on(aligned(inverted), gap_us=0)) == []
+    assert board.counts.spoilt == 2
 
 
 def test_stop_cuts_in_when_a_sender_is_always_inside_a_message():
