@@ -60,6 +60,8 @@ def decode(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON (docs/decode-json.md) instead of a table.")
     ] = False,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw the decode (.png, .pdf, .svg).")] = None,
+    explain: Annotated[bool, typer.Option("--explain", help="Say stage by stage what was found.")] = False,
 ) -> None:
     """Decode the message in a recording.
 
@@ -71,7 +73,7 @@ def decode(
         from mtm_audit.decode import DecodeSettings
 
         settings = DecodeSettings(detector, onset_s, decoys, threshold, pairs)
-        code = run_decode(DecodeOptions(tuple(paths), key, tracker, settings, as_json))
+        code = run_decode(DecodeOptions(tuple(paths), key, tracker, settings, as_json, plot, explain))
     raise typer.Exit(code)
 
 
