@@ -81,13 +81,14 @@ def _draw_tracks(axes: Axes, tracks: tuple[Track, ...]) -> None:
 
 def _draw_scores(axes: Axes, decoding: Decoding) -> None:
     names, table = _score_table(decoding)
-    image = axes.imshow(table, aspect="auto", cmap="Blues", vmin=0.9 * float(table.min()))
+    # The scale reaches well above the common score, so that scores which hardly differ look so.
+    low, high = 0.9 * float(table.min()), max(float(table.max()), 1.6 * float(np.median(table)))
+    image = axes.imshow(table, aspect="auto", cmap="Blues", vmin=low, vmax=high)
     axes.figure.colorbar(image, ax=axes, shrink=0.85, label="score")
     best = np.argmax(table, axis=1)
-    middle = (float(table.min()) + float(table.max())) / 2.0
     if table.size <= _WRITTEN_CELLS:
         for (row, symbol), score in np.ndenumerate(table):
-            colour = "white" if score > middle else "#344054"
+            colour = "white" if score > (low + high) / 2.0 else "#344054"
             axes.text(symbol, row, f"{score:.2f}", ha="center", va="center", fontsize=9, color=colour)
     marked = decoding.verdict != "absent"
     if marked:
@@ -145,7 +146,7 @@ def _name_places(axes: Axes, names: list[str]) -> None:
 
 
 def _legend_below(axes: Axes) -> None:
-    axes.legend(fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=4, frameon=False)
+    axes.legend(fontsize=9, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=4, frameon=False)
 
 
 def _tidy(axes: Axes) -> None:

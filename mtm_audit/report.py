@@ -36,10 +36,13 @@ def message_bits(decoding: Decoding) -> str | None:
 
 def chance_sentence(decoding: Decoding) -> str:
     """The p-value in words, and what it is estimated from."""
-    evidence = decoding.evidence
+    evidence, decoys = decoding.evidence, len(decoding.evidence.decoy_strengths)
+    basis = f"judged by {decoys} decoy keys"
+    if evidence.p_value < 1.0 / decoys:
+        basis = f"extrapolated from {decoys} decoy keys"
     return (
-        f"About {rarity(evidence.p_value)} recordings without a message of this key would look like this, judged by "
-        f"{len(evidence.decoy_strengths)} decoy keys; the limit is {rarity(decoding.settings.threshold)}."
+        f"About {rarity(evidence.p_value)} recordings without a message of this key would look like this, {basis}; "
+        f"the limit is {rarity(decoding.settings.threshold)}."
     )
 
 
