@@ -52,6 +52,9 @@ def record(
     seed: Annotated[int, typer.Option(min=0, help="Decides everything random but the message's waveforms.")] = 0,
     camera: Annotated[CameraName, typer.Option(help="Which camera films.")] = CameraName.OVERHEAD,
     no_video: Annotated[bool, typer.Option("--no-video", help="Motion capture alone.")] = False,
+    realtime: Annotated[
+        bool, typer.Option("--realtime", help="Run the onboard programs in processes of their own, on serial adapters.")
+    ] = False,
 ) -> None:
     """Record four simulated robots: motion capture, video, and what was sent."""
     if (message is None) != no_message:
@@ -61,7 +64,41 @@ def record(
         from hil.commands.record import record as run
 
         film = None if no_video else camera.value
-        run(RecordOptions(out, seconds, message, key, wire.value, seed, film), console)
+        run(RecordOptions(out, seconds, message, key, wire.value, seed, film, realtime), console)
+
+
+_CELLS_HELP = "Finished rollouts; a run that was interrupted goes on from there."
+
+
+@app.command()
+def calibrate(
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each slip and window length.")] = 20,
+    out: Annotated[Path | None, typer.Option(help="The plant's file; that of the package by default.")] = None,
+    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/calibrate.jsonl"),
+) -> None:
+    """Fit the simulated chassis' wheel slip to the paper's margins."""
+    with _reported() as console:
+        from hil.commands.calibrate import calibrate as run
+
+        run(rollouts, out, cells, console)
+
+
+paper = typer.Typer(help="The paper's tables, measured on the simulated robots.", no_args_is_help=True)
+app.add_typer(paper, name="paper")
+
+
+@paper.command("robomaster")
+def paper_robomaster(
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each row of the table.")] = 40,
+    quick: Annotated[bool, typer.Option("--quick", help="Five rollouts, for a first look.")] = False,
+    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
+    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/robomaster.jsonl"),
+) -> None:
+    """Accuracy and margin over the window length, with a wrong key and without a message, beside the paper's."""
+    with _reported() as console:
+        from hil.commands.paper import paper_robomaster as run
+
+        run(5 if quick else rollouts, out, cells, console)
 
 
 @contextmanager

@@ -55,18 +55,13 @@ class _Robot:
         self.source.set(self.task.command(self.plant.position_xy_m, self.plant.heading_rad), now_s)
         self.runtime.step(tick, now_s)
 
-    def report(self) -> RobotReport:
+    def report(self, stats: LoopStats) -> RobotReport:
         guard, controller = self.guard, self.controller
         is_stopped = not controller.work_mode and controller.demand == STOP
         return RobotReport(
-            self.name,
-            guard.clamped,
-            guard.stale,
-            guard.refused,
-            self.link.faults(),
-            controller.deadman_stops,
-            is_stopped,
-        )
+            self.name, stats.sent, stats.missed, guard.clamped, guard.stale, guard.refused, self.link.faults(),
+            controller.deadman_stops, is_stopped,
+        )  # fmt: skip
 
 
 def run_lockstep(settings: RunSettings) -> RunResult:
@@ -97,7 +92,7 @@ def run_lockstep(settings: RunSettings) -> RunResult:
     clock.sleep_until(settings.seconds + _SETTLING_S)
     motion = np.frombuffer(poses[:samples], dtype=np.float64).reshape(-1, len(robots), 3)
     names = [channel.body for channel in scheme.channels]
-    return RunResult(_trajectories(names, motion), settings.start_s, stats, tuple(robot.report() for robot in robots))
+    return RunResult(_trajectories(names, motion), settings.start_s, tuple(robot.report(stats) for robot in robots))
 
 
 def _loop(settings: RunSettings, clock: SimulatedClock, step: Callable[[int, float], None]) -> LoopStats:

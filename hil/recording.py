@@ -66,9 +66,7 @@ def truth(settings: RunSettings, result: RunResult) -> dict[str, Any]:
         "scheme": scheme.name,
         "scheme_fingerprint": scheme.fingerprint,
         "seed": settings.seed,
-        "robots": [robot.name for robot in result.robots],
-        "ticks_sent": result.stats.sent,
-        "ticks_missed": result.stats.missed,
+        "robots": [{"name": robot.name, "sent": robot.sent, "missed": robot.missed} for robot in result.robots],
     }
 
 

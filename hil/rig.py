@@ -13,7 +13,6 @@ from hil.robots.mecanum import MecanumParameters, calibrated_parameters
 from hil.sensors.poses import Trajectory
 from hil.worlds.robomaster import ROBOTS, random_permutation
 from mtm_onboard.guard import Limits
-from mtm_onboard.loop import LoopStats
 from mtm_onboard.modulator import Modulator
 from mtm_onboard.protocol import Codebook, Key, MtmError
 from mtm_onboard.protocol.framing import check_symbols
@@ -85,30 +84,32 @@ def seeds_of(seed: int) -> Seeds:
 
 @dataclass(frozen=True)
 class RobotReport:
-    """Counters of one robot: the guard's, in ticks, and what its motion controller found wrong."""
+    """How one robot fared, in ticks unless it says otherwise; `faults` is what either end of its link found wrong.
+
+    `late_s` are the median and the 99th percentile of how late its ticks began, zero in simulated time.
+    """
 
     name: str
+    sent: int
+    missed: int
     clamped: int
     stale: int
     refused: int
     faults: int
     deadman_stops: int
     is_stopped: bool
+    late_s: tuple[float, float] = (0.0, 0.0)
 
     @property
     def is_clean(self) -> bool:
-        """Whether nothing went wrong and the motors were off after the run; clamping is no fault."""
+        """Whether nothing went wrong and the motors were off after the run; missing or clamping is no fault."""
         return self.is_stopped and not (self.stale or self.refused or self.faults or self.deadman_stops)
 
 
 @dataclass(frozen=True)
 class RunResult:
-    """The true motion at 100 Hz from the start on, when the message began, and how loop and robots fared.
-
-    `stats.sent` is the number of commands that each robot was sent.
-    """
+    """The true motion at 100 Hz from the start of the run on, when in it the message began, and the robots' reports."""
 
     trajectories: tuple[Trajectory, ...]
     onset_s: float
-    stats: LoopStats
     robots: tuple[RobotReport, ...]

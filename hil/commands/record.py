@@ -5,22 +5,30 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.progress import Progress
+from rich.table import Table
 
 from hil.cameras import CAMERAS
 from hil.lockstep import run_lockstep
 from hil.newfolder import new_folder
 from hil.recording import Sensors, write_recording
-from hil.rig import RunSettings, Wire
+from hil.realtime import START_S, run_realtime
+from hil.rig import RobotReport, RunSettings, Wire
 from hil.worlds.robomaster import fleet_scheme
 from mtm_onboard.protocol import generate_key, load_key, save_key
 from mtm_onboard.protocol.framing import symbols_of_number
 
 KEY_NAME = "robot.key"
+# From the start of the recording to the message's, in simulated time.
+LEAD_S = 1.5
 
 
 @dataclass(frozen=True)
 class RecordOptions:
-    """What the command line asked for; `message` None moves the robots without one, `key` None makes a key."""
+    """What the command line asked for.
+
+    `message` None moves the robots without one, `key` None makes a key, `camera` None films nothing. `realtime` runs
+    the onboard programs on serial CAN adapters, whatever `wire` says.
+    """
 
     out: Path
     seconds: float
@@ -29,6 +37,7 @@ class RecordOptions:
     wire: Wire
     seed: int
     camera: str | None
+    realtime: bool
 
 
 def record(options: RecordOptions, console: Console) -> None:
@@ -36,16 +45,24 @@ def record(options: RecordOptions, console: Console) -> None:
     key = generate_key("hil", fleet_scheme()) if options.key is None else load_key(options.key)
     symbols = None if options.message is None else symbols_of_number(options.message, key.scheme)
     sensors = Sensors(camera=None if options.camera is None else CAMERAS[options.camera])
-    settings = RunSettings(key, symbols, options.seconds, options.seed, options.wire)
+    settings = RunSettings(
+        key, symbols, options.seconds, options.seed, options.wire, START_S if options.realtime else LEAD_S
+    )
     with new_folder(options.out) as folder:
         if options.key is None:
             save_key(key, folder / KEY_NAME)
-        result = run_lockstep(settings)
+        if options.realtime:
+            (folder / "onboard").mkdir()
+            result = run_realtime(settings, options.key or folder / KEY_NAME, folder / "onboard")
+        else:
+            result = run_lockstep(settings)
         frames = 0 if sensors.camera is None else int(options.seconds * sensors.camera.rate_hz)
         with Progress(console=console, transient=True, disable=not (frames and console.is_terminal)) as progress:
             task = progress.add_task("filming", total=frames)
             write_recording(folder, settings, result, sensors, lambda done: progress.update(task, completed=done))
     _say_what_was_recorded(options, settings)
+    if options.realtime:
+        console.print(_robots_table(result.robots))
 
 
 def _say_what_was_recorded(options: RecordOptions, settings: RunSettings) -> None:
@@ -53,3 +70,13 @@ def _say_what_was_recorded(options: RecordOptions, settings: RunSettings) -> Non
     print(f"{options.out}: {options.seconds:g} s of motion, {sent}")
     if options.key is None:
         print(f"the key is {options.out / KEY_NAME}; keep it secret")
+
+
+def _robots_table(robots: tuple[RobotReport, ...]) -> Table:
+    table = Table(title="ticks of each robot", box=None)
+    for name in ("", "sent", "missed", "clamped", "stale", "refused", "faults", "late p50 ms", "late p99 ms"):
+        table.add_column(name, justify="right")
+    for robot in robots:
+        counts = (robot.sent, robot.missed, robot.clamped, robot.stale, robot.refused, robot.faults)
+        table.add_row(robot.name, *map(str, counts), *(f"{1e3 * late_s:.2f}" for late_s in robot.late_s))
+    return table

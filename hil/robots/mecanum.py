@@ -36,9 +36,9 @@ class MecanumParameters:
     step_s: float
 
 
-def calibrated_parameters() -> MecanumParameters:
+def calibrated_parameters(path: Path = PLANT_FILE) -> MecanumParameters:
     """The plant that reproduces the paper's RoboMaster table with the paper's own detector."""
-    table = tomllib.loads(PLANT_FILE.read_text(encoding="utf-8"))
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
     return MecanumParameters(**table["plant"])
 
 

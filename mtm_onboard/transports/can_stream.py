@@ -9,7 +9,8 @@ from mtm_onboard.transports.duml import Message, Parser, encode, segment
 if TYPE_CHECKING:
     import can
 
-_SEND_TIMEOUT_S = 0.005
+# Above a busy host's own stalls, which pyserial takes for a line that is full, and below the robot's deadman.
+_SEND_TIMEOUT_S = 0.1
 _MOST_FRAMES_A_READ = 512  # so that a babbling bus cannot hold its reader for ever
 
 

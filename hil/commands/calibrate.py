@@ -1,0 +1,34 @@
+"""`mtm-hil calibrate`: fit the simulated chassis to the paper's hardware."""
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from hil.experiments.calibrate import SLIPS_MPS, Candidate, best_candidate, scan, write_plant
+from hil.experiments.cells import CellStore
+from hil.experiments.paper_figures import MARGINS
+from hil.robots.mecanum import PLANT_FILE, calibrated_parameters
+
+
+def calibrate(rollouts: int, out: Path | None, cells: Path, console: Console) -> None:
+    """Scan the slip, print what each gave, and write the plant's file (that of the package when `out` is None)."""
+    plant = calibrated_parameters()
+    with CellStore(cells) as store:
+        candidates = scan(plant, SLIPS_MPS, rollouts, store, console)
+    best = best_candidate(candidates)
+    console.print(_table(candidates, best))
+    path = PLANT_FILE if out is None else out
+    write_plant(path, plant, best, f"mtm-hil calibrate -n {rollouts}")
+    print(f"wrote {path}: slip_mps = {best.slip_mps:g}")
+
+
+def _table(candidates: list[Candidate], best: Candidate) -> Table:
+    table = Table(title="margin over the paper's (symbol accuracy in percent)")
+    for name in ("slip m/s", *(f"T = {ticks}" for ticks in MARGINS), "misfit"):
+        table.add_column(name, justify="right")
+    for candidate in candidates:
+        ratios = [f"{ratio:.2f} ({100 * candidate.accuracies[ticks]:.1f})" for ticks, ratio in candidate.ratios.items()]
+        style = "bold" if candidate is best else None
+        table.add_row(f"{candidate.slip_mps:g}", *ratios, f"{candidate.misfit:.4f}", style=style)
+    return table

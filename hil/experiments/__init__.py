@@ -1,0 +1,1 @@
+"""Experiments: sweeps over many seeded runs, and the tables made of them."""

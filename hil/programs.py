@@ -1,0 +1,14 @@
+"""The project's own programs, as a user would call them."""
+
+import sysconfig
+from pathlib import Path
+
+from mtm_onboard.protocol import MtmError
+
+
+def program(name: str) -> str:
+    """Path of an installed program such as mtm-audit; raises MtmError when it is not there."""
+    path = Path(sysconfig.get_path("scripts")) / name
+    if not path.is_file():
+        raise MtmError(f"{name} is not installed beside mtm-hil; install the project with pip install -e .")
+    return str(path)

@@ -1,0 +1,135 @@
+"""A run in real time: every robot's onboard runtime in a process of its own, the simulated robots in this one.
+
+The onboard programs meet serial CAN adapters and a UDP port, as on a robot, and start their message at a common
+instant. This process is the robots' motion controllers, the chassis, and the controller that sends base commands.
+"""
+
+import time
+from array import array
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hil.onboard_process import OnboardProcess
+from hil.rig import SAMPLE_PERIOD_S, RunResult, RunSettings, seeds_of
+from hil.robots.can_node import CanMotionController
+from hil.robots.mecanum import MecanumPlant
+from hil.robots.motion_controller import MotionController
+from hil.robots.slcan_port import SlcanPort
+from hil.sensors.poses import Trajectory
+from hil.worlds.robomaster import GoToGoal, routes
+from mtm_onboard.client import BaseCommandClient
+from mtm_onboard.clock import SystemClock
+from mtm_onboard.loop import run_loop
+from mtm_onboard.protocol import MtmError
+
+# Four interpreters have to start before the message does.
+START_S = 4.0
+
+_POLLS_PER_COMMAND = 2
+_POLLS_PER_CHECK = 100
+_FAREWELL_S = 3.0
+
+
+@dataclass
+class _Robot:
+    """One simulated robot, its task controller, and the program that drives it."""
+
+    node: CanMotionController
+    plant: MecanumPlant
+    task: GoToGoal
+    process: OnboardProcess
+    client: BaseCommandClient
+
+    def command(self) -> None:
+        self.client.send(self.task.command(self.plant.position_xy_m, self.plant.heading_rad))
+
+
+def run_realtime(settings: RunSettings, key_file: Path, folder: Path) -> RunResult:
+    """Run for `settings.seconds` of real time; configurations, journals and outputs of the programs go to `folder`.
+
+    `key_file` holds `settings.key`; the plants' wire is the CAN protocol over a pseudo-terminal. Raises MtmError when
+    a program fails, starts too late or sends a tick twice.
+    """
+    clock = SystemClock()
+    with ExitStack() as stack:
+        began_s, start_unix_s = clock.now(), time.time() + settings.start_s
+        robots = _robots(settings, _arguments(settings, key_file, start_unix_s), folder, stack)
+        motion, times_s = _drive(settings, clock, began_s, robots)
+        for robot in robots:
+            if robot.process.is_running:
+                raise MtmError(f"mtm-onboard of {robot.process.name} did not end in time; run it again")
+            robot.process.check()
+        reports = tuple(robot.process.report(robot.node) for robot in robots)
+    poses = np.frombuffer(motion, dtype=np.float64).reshape(-1, len(robots), 3)
+    instants_s = np.frombuffer(times_s, dtype=np.float64)
+    trajectories = tuple(
+        Trajectory(robot.process.name, instants_s, poses[:, number, :2], poses[:, number, 2])
+        for number, robot in enumerate(robots)
+    )
+    return RunResult(trajectories, settings.start_s, reports)
+
+
+def _drive(
+    settings: RunSettings, clock: SystemClock, began_s: float, robots: list[_Robot]
+) -> "tuple[array[float], array[float]]":
+    """Poll the robots until their programs have ended.
+
+    Returns their poses up to the run's end, x, y and heading of each robot in turn, and the times of those.
+    """
+    poses, times_s = array("d"), array("d")
+    last = -1
+
+    def step(tick: int, now_s: float) -> None:
+        nonlocal last
+        since_s = now_s - began_s
+        for robot in robots:
+            robot.node.poll(since_s)
+        if tick * SAMPLE_PERIOD_S <= settings.seconds + 1e-6:
+            # The chassis stands where its last whole step, that of this tick, has brought it.
+            times_s.append(tick * SAMPLE_PERIOD_S)
+            for robot in robots:
+                poses.extend((*robot.plant.position_xy_m, robot.plant.heading_rad))
+        if tick // _POLLS_PER_COMMAND > last // _POLLS_PER_COMMAND:
+            for robot in robots:
+                robot.command()
+        if tick // _POLLS_PER_CHECK > last // _POLLS_PER_CHECK:
+            for robot in robots:
+                robot.process.check()
+        last = tick
+
+    def ended() -> bool:
+        after_s = clock.now() - began_s - settings.seconds
+        return after_s > _FAREWELL_S or (after_s > 0.0 and not any(robot.process.is_running for robot in robots))
+
+    run_loop(clock, 1.0 / SAMPLE_PERIOD_S, step, start_s=began_s, stop=ended)
+    return poses, times_s
+
+
+def _arguments(settings: RunSettings, key_file: Path, start_unix_s: float) -> list[str]:
+    symbols = settings.symbols
+    message = ["--no-message"] if symbols is None else ["--symbols", ",".join(map(str, symbols))]
+    return [
+        "--key", str(key_file.resolve()), *message, "--start-at", f"{start_unix_s:.6f}",
+        "--duration", f"{settings.seconds - settings.start_s:.6f}",
+    ]  # fmt: skip
+
+
+def _robots(settings: RunSettings, arguments: list[str], folder: Path, stack: ExitStack) -> list[_Robot]:
+    seeds = seeds_of(settings.seed)
+    robots = []
+    for channel, slip, route in zip(
+        settings.key.scheme.channels, seeds.slips, routes(seeds.permutation()), strict=True
+    ):
+        plant = MecanumPlant(settings.plant, slip, route.start_xy_m)
+        port = SlcanPort()
+        stack.callback(port.shutdown)
+        process = OnboardProcess(folder, channel.body, channel.name, port, arguments)
+        stack.callback(process.end)
+        client = BaseCommandClient(process.udp_port)
+        stack.callback(client.close)
+        node = CanMotionController(MotionController(plant), port)
+        robots.append(_Robot(node, plant, GoToGoal(route), process, client))
+    return robots

@@ -1,0 +1,63 @@
+import importlib
+import io
+import os
+
+import pytest
+from rich.console import Console
+
+from hil.experiments.cells import Cell, CellStore
+from hil.experiments.sweep import run_sweep
+
+QUIET = Console(file=io.StringIO())
+
+
+# Another process imports what it computes from a module.
+MODULE = """
+import os
+
+def square(parameters, seed):
+    return {"square": parameters["x"] ** 2 + seed, "process": os.getpid(), "threads": os.environ["OMP_NUM_THREADS"]}
+"""
+
+
+def cells(count):
+    return [Cell("squares", {"x": number}, number % 3) for number in range(count)]
+
+
+def test_results_come_in_the_order_of_the_cells_from_other_processes(tmp_path, monkeypatch):
+    (tmp_path / "squares_of_a_test.py").write_text(MODULE)
+    monkeypatch.syspath_prepend(tmp_path)
+    square = importlib.import_module("squares_of_a_test").square
+    with CellStore(tmp_path / "cells.jsonl") as store:
+        results = run_sweep(square, cells(6), store, QUIET, workers=2)
+    assert [result["square"] for result in results] == [number**2 + number % 3 for number in range(6)]
+    assert os.getpid() not in {result["process"] for result in results}
+    assert {result["threads"] for result in results} == {"1"}
+
+
+def test_a_sweep_that_was_interrupted_goes_on_where_it_was(tmp_path):
+    calls = []
+
+    def interrupted(parameters, seed):
+        calls.append(parameters["x"])
+        if len(calls) == 4:
+            raise KeyboardInterrupt
+        return {"x": parameters["x"]}
+
+    with CellStore(tmp_path / "cells.jsonl") as store, pytest.raises(KeyboardInterrupt):
+        run_sweep(interrupted, cells(6), store, QUIET, workers=1)
+    with CellStore(tmp_path / "cells.jsonl") as store:
+        assert [result["x"] for result in run_sweep(interrupted, cells(6), store, QUIET, workers=1)] == list(range(6))
+    assert calls == [0, 1, 2, 3, 3, 4, 5]
+
+
+def test_a_cell_that_is_asked_for_twice_is_computed_once(tmp_path):
+    calls = []
+
+    def count(parameters, seed):
+        calls.append(seed)
+        return {"n": len(calls)}
+
+    with CellStore(tmp_path / "cells.jsonl") as store:
+        assert run_sweep(count, [*cells(1), *cells(1)], store, QUIET, workers=1) == [{"n": 1}, {"n": 1}]
+    assert calls == [0]

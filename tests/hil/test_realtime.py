@@ -1,0 +1,62 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hil.onboard_process import check_ticks
+from hil.realtime import run_realtime
+from mtm_onboard.journal import JournalHeader, JournalRecord, read_journal
+from mtm_onboard.protocol import MtmError, save_key
+from tests.hil.fleet import fake_key, short_run
+
+
+def journal(ticks, damaged=0):
+    count = len(ticks)
+    header = JournalHeader("0" * 16, "fake", "robot0", "robot0", (0, 1, 2, 3), True, 50.0, 0.0, None)
+    ticks = np.array(ticks, dtype=np.int64)
+    rows, none = np.zeros((count, 3)), np.zeros(count)
+    return JournalRecord(header, ticks, ticks / 50, rows, rows, none, none.astype(np.int64), damaged)
+
+
+def test_missed_ticks_are_counted():
+    assert check_ticks("robot0", journal([-2, -1, 0, 1, 2])) == (5, 0)
+    assert check_ticks("robot0", journal([-2, 0, 1, 5])) == (4, 4)
+
+
+@pytest.mark.parametrize(
+    ("record", "sentence"),
+    [
+        (journal([0, 1, 1, 2]), "a tick twice"),
+        (journal([0, 2, 1]), "a tick twice"),
+        (journal([]), "0 rows"),
+        (journal([0, 1], damaged=1), "1 damaged"),
+        (journal([3, 4]), "began at tick 3"),
+    ],
+)
+def test_a_journal_that_shows_a_failed_run_is_refused(record, sentence):
+    with pytest.raises(MtmError, match=sentence):
+        check_ticks("robot0", record)
+
+
+@pytest.mark.realtime
+def test_four_onboard_programs_drive_four_robots_through_serial_adapters(tmp_path):
+    settings = short_run(key=fake_key(100), seconds=6.0, start_s=3.5)
+    save_key(settings.key, tmp_path / "robot.key")
+    result = run_realtime(settings, tmp_path / "robot.key", tmp_path)
+    assert [robot.name for robot in result.robots] == ["robot0", "robot1", "robot2", "robot3"]
+    assert all(robot.is_stopped and robot.faults == 0 for robot in result.robots), result.robots
+    for trajectory in result.trajectories:
+        assert trajectory.times_s[-1] == pytest.approx(6.0, abs=0.1)
+        assert np.ptp(trajectory.positions_xy_m[:, 0]) > 0.3
+    for robot in result.robots:
+        header = read_journal(tmp_path / f"{robot.name}.csv").header
+        assert (header.symbols, header.fingerprint) == (settings.symbols, settings.key.scheme.fingerprint)
+
+
+@pytest.mark.realtime
+def test_a_program_that_fails_ends_the_run_with_its_own_words(tmp_path):
+    settings = short_run(seconds=6.0, start_s=3.5)
+    (tmp_path / "robot.key").write_text("no key")
+    (tmp_path / "robot.key").chmod(0o600)
+    with pytest.raises(MtmError, match="mtm-onboard of robot0 ended with code 1.*robot.key is not valid TOML"):
+        run_realtime(replace(settings, symbols=None), tmp_path / "robot.key", tmp_path)
