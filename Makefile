@@ -18,6 +18,7 @@ $(STAMP): pyproject.toml
 	@touch $@
 
 demo: setup
+	rm -rf out/demo
 	$(BIN)/mtm-hil demo --out out/demo
 
 test: setup lint

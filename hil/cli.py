@@ -67,6 +67,16 @@ def record(
         run(RecordOptions(out, seconds, message, key, wire.value, seed, film, realtime), console)
 
 
+@app.command()
+def demo(out: Annotated[Path, typer.Option(help="The folder to make; it must not exist.")]) -> None:
+    """Send a message, film it, and decode it: the whole way in under a minute."""
+    with _reported() as console:
+        from hil.commands.demo import demo as run
+
+        if not run(out, console):
+            raise typer.Exit(1)
+
+
 _CELLS_HELP = "Finished rollouts; a run that was interrupted goes on from there."
 
 

@@ -10,8 +10,8 @@ from rich.table import Table
 from hil.cameras import CAMERAS
 from hil.lockstep import run_lockstep
 from hil.newfolder import new_folder
-from hil.recording import Sensors, write_recording
 from hil.realtime import START_S, run_realtime
+from hil.recording import Sensors, write_recording
 from hil.rig import RobotReport, RunSettings, Wire
 from hil.worlds.robomaster import fleet_scheme
 from mtm_onboard.protocol import generate_key, load_key, save_key
@@ -73,8 +73,8 @@ def _say_what_was_recorded(options: RecordOptions, settings: RunSettings) -> Non
 
 
 def _robots_table(robots: tuple[RobotReport, ...]) -> Table:
-    table = Table(title="ticks of each robot", box=None)
-    for name in ("", "sent", "missed", "clamped", "stale", "refused", "faults", "late p50 ms", "late p99 ms"):
+    table = Table(title="ticks of each robot, and how late they began", box=None)
+    for name in ("", "sent", "missed", "clamped", "stale", "refused", "faults", "p50 ms", "p99 ms"):
         table.add_column(name, justify="right")
     for robot in robots:
         counts = (robot.sent, robot.missed, robot.clamped, robot.stale, robot.refused, robot.faults)
