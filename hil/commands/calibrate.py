@@ -24,11 +24,14 @@ def calibrate(rollouts: int, out: Path | None, cells: Path, console: Console) ->
 
 
 def _table(candidates: list[Candidate], best: Candidate) -> Table:
-    table = Table(title="margin over the paper's (symbol accuracy in percent)")
-    for name in ("slip m/s", *(f"T = {ticks}" for ticks in MARGINS), "misfit"):
-        table.add_column(name, justify="right")
+    table = Table(
+        title="margin over the paper's at each T (symbol accuracy in percent)", box=None, padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )  # fmt: skip
+    for name in ("slip", *map(str, MARGINS), "misfit"):
+        table.add_column(name, justify="right", no_wrap=True)
     for candidate in candidates:
-        ratios = [f"{ratio:.2f} ({100 * candidate.accuracies[ticks]:.1f})" for ticks, ratio in candidate.ratios.items()]
+        ratios = [f"{ratio:.2f} ({100 * candidate.accuracies[ticks]:.0f})" for ticks, ratio in candidate.ratios.items()]
         style = "bold" if candidate is best else None
         table.add_row(f"{candidate.slip_mps:g}", *ratios, f"{candidate.misfit:.4f}", style=style)
     return table

@@ -68,6 +68,10 @@ def record(options: RecordOptions, console: Console) -> None:
 def _say_what_was_recorded(options: RecordOptions, settings: RunSettings) -> None:
     sent = "no message" if options.message is None else f"message {options.message}, from {settings.start_s:g} s on"
     print(f"{options.out}: {options.seconds:g} s of motion, {sent}")
+    scheme = settings.key.scheme
+    whole_s = settings.start_s + scheme.message_ticks / scheme.rate_hz
+    if options.message is not None and options.seconds < whole_s:
+        print(f"the message is cut off; it takes --seconds {whole_s:g} to record it once")
     if options.key is None:
         print(f"the key is {options.out / KEY_NAME}; keep it secret")
 

@@ -6,6 +6,9 @@ import pytest
 
 from hil.cameras import CAMERAS
 from hil.cli import CameraName, main
+from hil.experiments.calibrate import SLIPS_MPS
+from hil.experiments.paper_figures import MARGINS
+from hil.lockstep import run_lockstep
 from mtm_audit.recordings.motion_capture import read_tum
 from mtm_audit.recordings.video import read_frames
 from mtm_onboard.protocol import load_key
@@ -21,7 +24,9 @@ def run(*arguments):
 
 def test_a_recording_has_motion_capture_the_truth_and_the_key(tmp_path, capsys):
     assert run(*QUICK, "--message", 178, "--no-video", "--out", tmp_path / "a") == 0
-    assert "keep it secret" in capsys.readouterr().out
+    output = capsys.readouterr().out
+    assert "keep it secret" in output
+    assert "it takes --seconds 13.5 to record it once" in output
     truth = json.loads((tmp_path / "a" / "truth.json").read_text())
     assert (truth["message"], truth["symbols"], truth["onset_s"]) == (178, [2, 3, 0, 2], 1.5)
     key = load_key(tmp_path / "a" / "robot.key")
@@ -80,6 +85,22 @@ def test_wrong_usage_ends_with_2(tmp_path, arguments):
     assert run("record", "--out", tmp_path / "a", *arguments) == 2
 
 
+def test_in_real_time_the_programs_get_the_key_file_and_a_folder_for_their_journals(tmp_path, monkeypatch, capsys):
+    def as_if_in_real_time(settings, key_file, folder):
+        assert load_key(key_file) == settings.key
+        assert folder.is_dir()
+        assert settings.start_s == 4.0
+        return run_lockstep(settings)
+
+    monkeypatch.setattr("hil.commands.record.run_realtime", as_if_in_real_time)
+    wanted = ["--seconds", "5", "--realtime", "--message", "1", "--no-video", "--out", tmp_path / "a"]
+    assert run("record", *wanted) == 0
+    assert (tmp_path / "a" / "onboard").is_dir()
+    assert json.loads((tmp_path / "a" / "truth.json").read_text())["onset_s"] == 4.0
+    table = capsys.readouterr().out
+    assert table.count("250       0") == 4
+
+
 def test_an_interrupt_ends_with_130_and_leaves_nothing(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
@@ -98,3 +119,33 @@ def test_help_loads_neither_opencv_nor_scipy():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "--no-video" in done.stdout
     assert not {"cv2", "scipy", "can", "numpy"} & set(done.stdout.split())
+
+
+@pytest.fixture
+def quick_rollouts(monkeypatch):
+    """Rollouts with the paper's own margins at a slip of 0.0425 m/s and smaller ones at any other, in this process."""
+
+    def as_in_the_paper(parameters, seed):
+        far = 1.0 + 10.0 * abs(parameters["slip_mps"] - 0.0425)
+        return {"decodes": 4, "correct": 3, "margin": MARGINS[parameters["message_ticks"]] / far}
+
+    monkeypatch.setattr("hil.experiments.calibrate.decode_rollout", as_in_the_paper)
+    monkeypatch.setattr("hil.experiments.paper_robomaster.decode_rollout", as_in_the_paper)
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0})
+
+
+def test_calibrating_writes_the_plant_s_file_and_prints_every_candidate(quick_rollouts, tmp_path, capsys):
+    cells, plant = tmp_path / "cells.jsonl", tmp_path / "plant.toml"
+    assert run("calibrate", "-n", 2, "--out", plant, "--cells", cells) == 0
+    assert "slip_mps = 0.0425\n" in plant.read_text()
+    assert plant.read_text().startswith("# Written by: mtm-hil calibrate -n 2\n")
+    output = capsys.readouterr().out
+    assert output.count("(75)") == 6 * len(SLIPS_MPS)
+    assert len(cells.read_text().splitlines()) == 2 * 6 * len(SLIPS_MPS)
+
+
+def test_the_paper_s_table_is_printed_and_written(quick_rollouts, tmp_path, capsys):
+    wanted = ["-n", 2, "--out", tmp_path / "a.csv", "--cells", tmp_path / "cells.jsonl"]
+    assert run("paper", "robomaster", *wanted) == 0
+    assert capsys.readouterr().out.count("75.0 [") == 8
+    assert (tmp_path / "a.csv").read_text().startswith(f"# mtm-hil paper robomaster -n 2 --out {tmp_path}/a.csv\n")
