@@ -18,6 +18,11 @@ def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
             "Either nobody sent one, or it was sent with another key, or the recording is too short or too coarse to "
             "show it.",
         )
+    if not decoding.uncertain and not decoding.order_known:
+        return (
+            "The message repeats, and nothing shows which of its symbols comes first; give --onset when it is known "
+            "when the robot began, or send with a key whose schedule is rolling.",
+        )
     if not decoding.uncertain:
         spelled = ", ".join(str(symbol) for symbol in decoding.symbols)
         return (

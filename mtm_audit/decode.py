@@ -9,6 +9,7 @@ from mtm_audit.assignment import assign_tracks
 from mtm_audit.detectors import make_detector
 from mtm_audit.detectors.base import Detector, Reading
 from mtm_audit.glimpse import Glimpse, glimpse_of_track
+from mtm_audit.order import order_is_known
 from mtm_audit.tracks import Floats, Track
 from mtm_audit.verdict import Evidence, VerdictName, decoy_codebooks, weigh
 from mtm_onboard.protocol.errors import MtmError
@@ -50,13 +51,15 @@ class Decoding:
     """The answer, and all it rests on.
 
     `symbols` has one entry a message position (None where nothing shows it), `posteriors` (L, M) the probabilities
-    behind them. `message` is the number they spell, given only with the verdict "decoded".
+    behind them. `message` is the number they spell, given only with the verdict "decoded". `order_known` is False when
+    the message repeats and nothing shows which of its symbols comes first.
     """
 
     verdict: VerdictName
     message: int | None
     symbols: tuple[int | None, ...]
     posteriors: Floats
+    order_known: bool
     evidence: Evidence
     channels: tuple[ChannelDecoding, ...]
     key_id: str
@@ -115,13 +118,21 @@ def _decoding(
     posteriors: Floats,
     evidence: Evidence,
 ) -> Decoding:
+    order_known = settings.onset_s is not None or all(
+        order_is_known(decoding.reading, decoding.channel, key.scheme.schedule)
+        for decoding in channels
+        if decoding.reading is not None
+    )
+
     def answer(verdict: VerdictName, message: int | None) -> Decoding:
-        return Decoding(verdict, message, symbols, posteriors, evidence, channels, key.id, key.scheme, settings)
+        return Decoding(
+            verdict, message, symbols, posteriors, order_known, evidence, channels, key.id, key.scheme, settings
+        )
 
     if evidence.p_value > settings.threshold:
         return answer("absent", None)
     undecided = answer("inconclusive", None)
-    if undecided.uncertain:
+    if undecided.uncertain or not order_known:
         return undecided
     message = number_of_symbols([symbol for symbol in symbols if symbol is not None], key.scheme)
     return undecided if message is None else answer("decoded", message)

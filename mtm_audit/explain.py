@@ -23,7 +23,7 @@ _TRY = {
     "glimpse": "record longer, with the robot in sight",
     "timing": "record at least one whole message, or give --onset when it is known when the message began",
     "symbols": "record longer or from closer; repeats of the message add up",
-    "message": "check what the robot was told to send",
+    "message": "give --onset when it is known, and check what the robot was told to send",
     "verdict": "check that the key is the robot's, that it was sending (its journal says), and record longer",
 }
 
@@ -78,7 +78,7 @@ def stages_of_decoding(decoding: Decoding) -> list[Stage]:
     """Glimpse to verdict; the stage that kept the message from being read is marked as failed."""
     weak = decoding.verdict == "absent"
     unclear = decoding.verdict == "inconclusive"
-    unspellable = unclear and not decoding.uncertain
+    unreadable = unclear and not decoding.uncertain
     stages = [
         Stage("glimpse", tuple(_glimpse_line(channel) for channel in decoding.channels)),
         Stage("timing", tuple(_timing_line(channel, decoding) for channel in decoding.channels)),
@@ -87,8 +87,8 @@ def stages_of_decoding(decoding: Decoding) -> list[Stage]:
     if weak:
         return [*stages, Stage("verdict", (verdict_sentence(decoding), chance_sentence(decoding)), failed=True)]
     stages += [
-        Stage("symbols", _symbol_lines(decoding), failed=unclear and not unspellable),
-        Stage("message", (_message_line(decoding),), failed=unspellable),
+        Stage("symbols", _symbol_lines(decoding), failed=unclear and not unreadable),
+        Stage("message", (_message_line(decoding),), failed=unreadable),
         Stage("verdict", (verdict_sentence(decoding), chance_sentence(decoding))),
     ]
     return stages
@@ -156,4 +156,6 @@ def _message_line(decoding: Decoding) -> str:
         return f"the symbols spell {decoding.message}, one of 0 to {(1 << bits) - 1} ({bits} bits)"
     if decoding.uncertain:
         return "not put together, since symbols are uncertain"
+    if not decoding.order_known:
+        return "not put together, since it repeats and nothing shows which symbol comes first"
     return f"the symbols spell no number of 0 to {(1 << bits) - 1}"

@@ -1,0 +1,134 @@
+import numpy as np
+import pytest
+
+from mtm_audit.detectors import make_detector
+from mtm_audit.detectors.base import Reading, combine_repeats, whole_windows
+from mtm_audit.detectors.coherency import CoherencyDetector, rate_searched_scores
+from mtm_audit.glimpse import Glimpse, glimpse_of_track
+from mtm_audit.timing import Timing
+from mtm_audit.tracks import Track
+from mtm_audit.verdict import decoy_codebooks
+from mtm_onboard.protocol import MtmError
+from tests.audit.moving_robot import key_of, robot_track, scheme_of
+
+KEY = key_of(scheme_of(symbols=(2,), ticks=600))
+CHANNEL = KEY.scheme.channels[0]
+
+
+@pytest.fixture(scope="module")
+def glimpse():
+    return glimpse_of_track(robot_track(KEY, "robot0", (3, 1), 14.0, onset_s=1.0))
+
+
+def read(key, glimpse, onset_s, decoys=0):
+    codebooks = [key.codebook(), *decoy_codebooks(key, decoys)]
+    return CoherencyDetector().read(codebooks, key.scheme.channels[0], glimpse, onset_s)
+
+
+def test_the_sent_symbols_score_best(glimpse):
+    (reading,) = read(KEY, glimpse, 1.0)
+    assert np.argmax(reading.scores, axis=1).tolist() == [3, 1]
+    ranked = np.sort(reading.scores, axis=1)
+    assert np.all(ranked[:, -1] - ranked[:, -2] > 0.05)
+
+
+def test_a_decoy_s_symbols_score_like_any_that_was_not_sent(glimpse):
+    key, *decoys = read(KEY, glimpse, 1.0, decoys=8)
+    others = np.concatenate([decoy.scores.ravel() for decoy in decoys])
+    quiet = np.sort(key.scores, axis=1)[:, :-1]
+    assert abs(quiet.mean() - others.mean()) < 0.05
+    assert key.strength > max(decoy.strength for decoy in decoys) + 0.1
+
+
+def test_the_onset_is_found_with_the_symbols(glimpse):
+    (reading,) = read(KEY, glimpse, None)
+    assert np.argmax(reading.scores, axis=1).tolist() == [3, 1]
+    assert reading.timing.onset_s == pytest.approx(1.0, abs=0.3)
+
+
+def test_repeats_of_a_message_are_read_as_more_of_the_same(glimpse):
+    key = key_of(scheme_of(symbols=(1,), ticks=200))
+    track = robot_track(key, "robot0", (2,), 12.2)
+    (reading,) = read(key, glimpse_of_track(track), 0.0)
+    assert reading.window_positions.tolist() == [0, 0, 0]
+    assert reading.scores == pytest.approx(reading.window_scores.mean(axis=0)[None, :])
+    assert np.argmax(reading.scores) == 2
+
+
+def test_a_rolling_schedule_plays_new_waveforms_in_every_window():
+    key = key_of(scheme_of(symbols=(1,), ticks=300, schedule="rolling"))
+    glimpse = glimpse_of_track(robot_track(key, "robot0", (1,), 12.2))
+    (reading,) = read(key, glimpse, 0.0)
+    assert np.argmax(reading.window_scores, axis=1).tolist() == [1, 1]
+
+
+def test_posteriors_are_sure_of_what_was_sent_and_unsure_of_chance(glimpse):
+    detector = CoherencyDetector()
+    key, *decoys = read(KEY, glimpse, 1.0, decoys=10)
+    sure = detector.posteriors(key, decoys)
+    assert sure.sum(axis=1) == pytest.approx(1.0)
+    assert sure[0, 3] > 0.99
+    assert sure[1, 1] > 0.99
+    chance = detector.posteriors(decoys[0], decoys[1:])
+    assert chance.max() < 0.99
+
+
+def test_the_paper_s_score_of_a_single_window_is_the_reading_s(glimpse):
+    (reading,) = read(KEY, glimpse, 1.0)
+    alone = rate_searched_scores(KEY.codebook(), CHANNEL, glimpse, 1.0, window=1)
+    assert alone == pytest.approx(reading.window_scores[1])
+
+
+def test_a_recording_too_short_for_a_window_is_refused():
+    track = robot_track(KEY, "robot0", (0, 0), 2.0)
+    with pytest.raises(MtmError, match="no whole window of 6 s"):
+        read(KEY, glimpse_of_track(track), 0.0)
+
+
+def test_a_track_with_too_few_axes_is_refused():
+    times_s = np.arange(900) / 50
+    flat = Track("robot0", times_s, np.sin(times_s)[:, None], np.ones(900, dtype=bool), axes=("x",))
+    with pytest.raises(MtmError, match="shows 1 axes but channel 'robot0' has 2"):
+        read(KEY, glimpse_of_track(flat), 0.0)
+
+
+def test_a_detector_that_does_not_exist_is_refused_with_the_ones_that_do():
+    with pytest.raises(MtmError, match="coherency"):
+        make_detector("guessing")
+
+
+def still(first_s, last_s):
+    edges_s = np.array([first_s, last_s])
+    return Glimpse("robot0", edges_s, np.zeros((1, 2)), np.ones(1, dtype=bool), ("x", "y"))
+
+
+@pytest.mark.parametrize(
+    ("onset_s", "backwards", "windows"),
+    [
+        (0.0, False, [0, 1, 2, 3, 4]),
+        (3.0, False, [0, 1, 2]),
+        (3.0, True, [-1, 0, 1, 2]),
+        (-3.0, False, [2, 3, 4, 5]),
+        (-4.0, True, [2, 3, 4, 5, 6]),
+        (11.0, False, []),
+    ],
+)
+def test_only_windows_inside_the_recording_count(onset_s, backwards, windows):
+    timing = Timing(onset_s, 50.0)
+    assert whole_windows(still(0.0, 10.0), timing, 100, backwards=backwards).tolist() == windows
+
+
+def test_three_quarters_of_a_single_window_are_enough():
+    assert whole_windows(still(0.0, 7.6), Timing(0.0, 50.0), 500, backwards=False).tolist() == [0]
+    assert whole_windows(still(0.0, 7.4), Timing(0.0, 50.0), 500, backwards=False).tolist() == []
+
+
+def test_positions_that_were_not_seen_have_no_scores():
+    scores = combine_repeats(np.array([[1.0, 2.0], [3.0, 6.0]]), np.array([2, 2]), 3)
+    assert scores.tolist() == [[0.0, 0.0], [0.0, 0.0], [2.0, 4.0]]
+
+
+def test_a_reading_holds_where_its_windows_began(glimpse):
+    (reading,) = read(KEY, glimpse, 1.0)
+    assert isinstance(reading, Reading)
+    assert reading.window_starts_s.tolist() == [1.0, 7.0]

@@ -1,0 +1,192 @@
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from mtm_audit.decode import DecodeSettings, decode_tracks
+from mtm_audit.tracks import Track
+from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.framing import number_of_symbols, symbols_of_number
+from tests.audit.moving_robot import OTHER_SECRET, key_of, robot_track, scheme_of
+
+KNOWN = DecodeSettings(onset_s=1.0, decoys=30)
+PAIR = key_of(scheme_of(symbols=(1, 1), ticks=400))
+SENT = (3, 1)
+
+
+@cache
+def pair(symbols=SENT, seconds=10.0, onset_s=1.0):
+    """Two robots, each with a symbol of its own; None for one that moves without a message."""
+    return tuple(
+        robot_track(PAIR, f"robot{n}", None if symbols[n] is None else (symbols[n],), seconds, onset_s=onset_s, seed=n)
+        for n in range(2)
+    )
+
+
+def test_a_message_is_decoded():
+    decoding = decode_tracks(pair(), PAIR, KNOWN)
+    assert decoding.verdict == "decoded"
+    assert decoding.symbols == SENT
+    assert decoding.message == number_of_symbols(SENT, PAIR.scheme) == 13
+    assert decoding.evidence.p_value < 1e-4
+    assert not decoding.uncertain
+
+
+def test_a_message_is_decoded_when_nobody_knows_when_it_began():
+    decoding = decode_tracks(pair(), PAIR, DecodeSettings(decoys=30))
+    assert (decoding.verdict, decoding.message) == ("decoded", 13)
+    for channel in decoding.channels:
+        assert channel.reading is not None
+        assert channel.reading.timing.onset_s == pytest.approx(1.0, abs=0.4)
+
+
+def test_the_wrong_key_finds_nothing():
+    decoding = decode_tracks(pair(), key_of(PAIR.scheme, OTHER_SECRET), KNOWN)
+    assert (decoding.verdict, decoding.message) == ("absent", None)
+    assert decoding.evidence.p_value > 0.001
+
+
+def test_the_wrong_key_finds_nothing_however_long_it_searches():
+    decoding = decode_tracks(pair(), key_of(PAIR.scheme, OTHER_SECRET), DecodeSettings(decoys=30))
+    assert (decoding.verdict, decoding.message) == ("absent", None)
+
+
+@pytest.mark.parametrize("onset_s", [1.0, None])
+def test_robots_that_send_nothing_give_absent(onset_s):
+    decoding = decode_tracks(pair((None, None)), PAIR, DecodeSettings(onset_s=onset_s, decoys=12))
+    assert (decoding.verdict, decoding.message) == ("absent", None)
+
+
+def test_a_robot_that_is_not_in_the_recording_leaves_the_message_open():
+    decoding = decode_tracks(pair()[:1], PAIR, KNOWN)
+    assert (decoding.verdict, decoding.message) == ("inconclusive", None)
+    assert decoding.symbols == (3, None)
+    assert decoding.uncertain == (1,)
+    assert decoding.posteriors[1] == pytest.approx(0.25)
+
+
+def test_a_robot_that_stays_silent_leaves_the_message_open():
+    long = key_of(scheme_of(symbols=(1, 1), ticks=800))
+    speaks = robot_track(long, "robot0", (3,), 18.0, onset_s=1.0)
+    silent = robot_track(long, "robot1", None, 18.0, seed=1)
+    decoding = decode_tracks([speaks, silent], long, replace(KNOWN, decoys=24))
+    assert (decoding.verdict, decoding.message) == ("inconclusive", None)
+    assert decoding.symbols[0] == 3
+    assert decoding.uncertain == (1,)
+
+
+def test_symbols_that_spell_no_number_are_no_message():
+    key = key_of(scheme_of(symbols=(1, 1), ticks=400, alphabet=3))
+    tracks = [robot_track(key, f"robot{n}", (2,), 10.0, onset_s=1.0, seed=n) for n in range(2)]
+    decoding = decode_tracks(tracks, key, KNOWN)
+    assert decoding.symbols == (2, 2)
+    assert number_of_symbols((2, 2), key.scheme) is None
+    assert (decoding.verdict, decoding.message, decoding.uncertain) == ("inconclusive", None, ())
+
+
+@pytest.mark.parametrize("pooling", ["mean", "majority"])
+def test_robots_that_carry_the_same_message_are_pooled(pooling):
+    key = key_of(scheme_of(symbols=(2, 2, 2), ticks=400, combine="same", pooling=pooling))
+    tracks = [robot_track(key, f"robot{n}", (0, 2), 9.5, onset_s=1.0, seed=n) for n in range(3)]
+    decoding = decode_tracks(tracks, key, KNOWN)
+    assert (decoding.verdict, decoding.symbols, decoding.message) == ("decoded", (0, 2), 2)
+    assert decoding.posteriors.shape == (2, 4)
+
+
+@pytest.mark.parametrize("pooling", ["mean", "majority"])
+def test_a_pooled_message_survives_a_missing_robot(pooling):
+    key = key_of(scheme_of(symbols=(1, 1, 1), ticks=400, combine="same", pooling=pooling))
+    tracks = [robot_track(key, f"robot{n}", (2,), 9.5, onset_s=1.0, seed=n) for n in range(2)]
+    assert decode_tracks(tracks, key, KNOWN).symbols == (2,)
+
+
+def test_a_recording_that_starts_in_the_middle_of_a_message_is_read_all_the_same():
+    key = key_of(scheme_of(symbols=(1, 1), ticks=400))
+    tracks = [robot_track(key, f"robot{n}", (SENT[n],), 21.0, onset_s=-5.0, seed=n) for n in range(2)]
+    decoding = decode_tracks(tracks, key, DecodeSettings(decoys=30))
+    assert (decoding.verdict, decoding.symbols) == ("decoded", SENT)
+
+
+SEVERAL = key_of(scheme_of(symbols=(2,), ticks=600))
+
+
+def test_a_repeated_message_whose_beginning_nobody_saw_is_not_put_together():
+    """3 1 3 1 3 is the message 3 1 or the message 1 3: neither may be called decoded."""
+    track = robot_track(SEVERAL, "robot0", (3, 1), 26.0, onset_s=-4.0)
+    decoding = decode_tracks([track], SEVERAL, DecodeSettings(decoys=30))
+    assert sorted(decoding.symbols) == [1, 3]
+    assert (decoding.verdict, decoding.message, decoding.order_known) == ("inconclusive", None, False)
+
+
+def test_a_repeated_message_is_put_together_when_its_beginning_is_given():
+    track = robot_track(SEVERAL, "robot0", (3, 1), 26.0, onset_s=-4.0)
+    decoding = decode_tracks([track], SEVERAL, DecodeSettings(onset_s=8.0, decoys=30))
+    assert (decoding.verdict, decoding.symbols) == ("decoded", (3, 1))
+
+
+def test_a_message_of_several_symbols_that_is_sent_once_needs_no_onset():
+    track = robot_track(SEVERAL, "robot0", (3, 1), 14.0, onset_s=1.0)
+    decoding = decode_tracks([track], SEVERAL, DecodeSettings(decoys=30))
+    assert (decoding.verdict, decoding.symbols) == ("decoded", (3, 1))
+
+
+def test_the_order_of_equal_symbols_does_not_matter():
+    track = robot_track(SEVERAL, "robot0", (2, 2), 26.0, onset_s=-4.0)
+    decoding = decode_tracks([track], SEVERAL, DecodeSettings(decoys=30))
+    assert (decoding.verdict, decoding.symbols) == ("decoded", (2, 2))
+
+
+def test_gaps_in_the_tracks_cost_little():
+    holed = []
+    for track in pair():
+        valid = np.ones(len(track.times_s), dtype=bool)
+        valid[200:260] = valid[600:640] = False
+        holed.append(replace(track, valid=valid, positions=np.where(valid[:, None], track.positions, np.nan)))
+    decoding = decode_tracks(holed, PAIR, KNOWN)
+    assert (decoding.verdict, decoding.message) == ("decoded", 13)
+
+
+def test_a_moved_turned_and_scaled_picture_says_the_same():
+    """What a camera on the ceiling sees: pixels, an axis each turned a little, any origin."""
+    turn = np.array([[np.cos(0.1), -np.sin(0.1)], [np.sin(0.1), np.cos(0.1)]])
+    seen = [replace(track, positions=300.0 * track.positions @ turn.T + 512.0, unit="px") for track in pair()]
+    assert decode_tracks(seen, PAIR, KNOWN).message == 13
+
+
+def test_every_decode_of_a_recording_says_the_same():
+    one, other = decode_tracks(pair(), PAIR, KNOWN), decode_tracks(pair(), PAIR, KNOWN)
+    assert one.evidence.p_value == other.evidence.p_value
+    assert np.array_equal(one.posteriors, other.posteriors)
+
+
+def test_tracks_can_be_assigned_by_hand():
+    crossed = [replace(pair()[0], name="red"), replace(pair()[1], name="blue")]
+    settings = replace(KNOWN, assignment={"robot0": "red", "robot1": "blue"})
+    assert decode_tracks(crossed, PAIR, settings).message == 13
+
+
+def test_progress_is_told():
+    told = []
+    decode_tracks(pair(), PAIR, replace(KNOWN, decoys=8), lambda stage, fraction: told.append((stage, fraction)))
+    assert told == [("reading robot0", 0.0), ("reading robot1", 0.5)]
+
+
+def test_a_recording_too_short_for_any_window_is_refused():
+    with pytest.raises(MtmError, match="no whole window"):
+        decode_tracks(pair(seconds=4.0), PAIR, KNOWN)
+
+
+def test_a_body_hardly_ever_seen_is_refused():
+    times_s = np.arange(500) / 50
+    valid = np.zeros(500, dtype=bool)
+    valid[:2] = True
+    track = Track("robot0", times_s, np.where(valid[:, None], 0.0, np.full((500, 2), np.nan)), valid)
+    with pytest.raises(MtmError, match="at least 3"):
+        decode_tracks([track], PAIR, KNOWN)
+
+
+@pytest.mark.parametrize("number", [0, 7, 15])
+def test_any_number_comes_back(number):
+    symbols = symbols_of_number(number, PAIR.scheme)
+    assert decode_tracks(pair(symbols), PAIR, KNOWN).message == number
