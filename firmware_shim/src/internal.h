@@ -32,4 +32,14 @@ mtm_q20 mtm_of_wire(uint32_t axis, uint32_t bits);
 uint32_t mtm_to_wire(uint32_t axis, mtm_q20 value);
 uint32_t mtm_f32_with_low_byte(uint32_t bits, uint8_t low);
 
+/* rewrite.c */
+#define MTM_PAYLOAD 11u
+#define MTM_SPEED_BYTES 25u
+#define MTM_SET_CHASSIS 0x3Fu
+#define MTM_ID_SPEED 0x21u
+/* A byte of the companion's stream has arrived and stands in `slot`, in the queue's last frame; it may still change. */
+void mtm_byte_arrived(mtm_gateway *gateway, uint8_t *slot);
+/* A command of the gateway's own is wanted now, not at the next tick. */
+void mtm_make_due(mtm_gateway *gateway);
+
 #endif

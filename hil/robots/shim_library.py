@@ -28,12 +28,14 @@ class Shim(NamedTuple):
 def load_shim() -> Shim:
     """Compile the sources with the host's C compiler, once for each state of them, and load the result.
 
-    Raises MtmError when there is no compiler, no cffi, or the sources do not compile.
+    Raises MtmError when there is no compiler, no cffi, no source, or the sources do not compile.
     """
     try:
         from cffi import FFI
     except ImportError as error:
         raise MtmError("the C shim needs cffi; install mtm[dev]") from error
+    if not HEADER.exists():
+        raise MtmError(f"the C shim's sources are not in {SOURCES}; run from a checkout of the project")
     ffi = FFI()
     ffi.cdef(_declarations(HEADER.read_text(encoding="utf-8")))
     return Shim(ffi, ffi.dlopen(str(_library())))
