@@ -36,4 +36,4 @@ bench: setup
 	$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-only -s
 
 clean:
-	rm -rf $(VENV) out build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) out build firmware_shim/build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
