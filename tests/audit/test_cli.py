@@ -1,0 +1,363 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from hil.sensors.motion_capture import write_tum
+from hil.sensors.video import write_video
+from mtm_audit.cli import main
+from mtm_audit.recordings.frames import Frame
+from mtm_onboard.protocol import save_key
+from tests.audit.moving_robot import FAKE_SECRET, OTHER_SECRET, key_of, robot_track, scheme_of
+
+KEY = key_of(scheme_of(symbols=(1, 1), ticks=400))
+ROOT = Path(__file__).parents[2]
+SCHEMA = json.loads((ROOT / "mtm_audit/decode.schema.json").read_text(encoding="utf-8"))
+QUICK = ("--onset", "1", "--decoys", "30")
+PNG = b"\x89PNG\r\n"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Keys, and motion capture of two robots that sent 13, and of two that sent nothing."""
+    path = tmp_path_factory.mktemp("audit")
+    save_key(KEY, path / "robot.key")
+    save_key(key_of(KEY.scheme, OTHER_SECRET), path / "other.key")
+    for name, symbols in (("sent", (3, 1)), ("silent", (None, None))):
+        (path / name).mkdir()
+        for number, symbol in enumerate(symbols):
+            own = None if symbol is None else (symbol,)
+            track = robot_track(KEY, f"robot{number}", own, 10.0, onset_s=1.0, seed=number)
+            track = replace(track, headings_rad=np.zeros(len(track.times_s)))
+            write_tum(track, path / name / f"robot{number}.tum")
+    return path
+
+
+@pytest.fixture
+def audit(folder, capsys):
+    """Run `mtm-audit decode` with the key; gives the exit code, standard output and standard error."""
+
+    def run(*arguments, key="robot.key"):
+        with pytest.raises(SystemExit) as left:
+            main(["decode", *map(str, arguments), "--key", str(folder / key)])
+        out, err = capsys.readouterr()
+        assert "Traceback" not in out + err
+        assert FAKE_SECRET.hex() not in out + err
+        return left.value.code or 0, out, err
+
+    return run
+
+
+def refused(answer, words):
+    """One sentence on standard error, nothing on standard output, exit code 1."""
+    code, out, err = answer
+    assert (code, out) == (1, "")
+    assert err.startswith("mtm-audit: ")
+    assert err.count("\n") == 1
+    assert words in err
+
+
+def test_a_decode_says_the_message_first_and_then_why(audit, folder):
+    code, out, err = audit(folder / "sent", *QUICK)
+    assert (code, err) == (0, "")
+    assert out.splitlines()[0] == "decoded: message 13 (0b1101)"
+    assert "without a message of this key would look like this" in out
+    assert KEY.scheme.fingerprint in out
+    rows = [line.split() for line in out.splitlines() if line.startswith("robot")]
+    assert [(row[0], row[1], row[2], row[3], row[5]) for row in rows] == [
+        ("robot0", "robot0", "1.00", "50.00", "3"),
+        ("robot1", "robot1", "1.00", "50.00", "1"),
+    ]
+
+
+def test_files_may_be_named_one_by_one(audit, folder):
+    code, out, _ = audit(folder / "sent/robot1.tum", folder / "sent/robot0.tum", *QUICK)
+    assert (code, out.splitlines()[0]) == (0, "decoded: message 13 (0b1101)")
+
+
+def test_the_beginning_is_searched_for_unless_given(audit, folder):
+    code, out, _ = audit(folder / "sent", "--json")
+    assert code == 0
+    assert json.loads(out)["channels"][0]["onset_s"] == pytest.approx(1.0, abs=0.4)
+
+
+@pytest.mark.parametrize(("name", "key"), [("silent", "robot.key"), ("sent", "other.key")])
+def test_absent_shows_no_symbol_that_could_be_taken_for_a_message(audit, folder, name, key):
+    code, out, _ = audit(folder / name, *QUICK, key=key)
+    assert code == 3
+    assert out.startswith("absent: no message of key fake was found")
+    assert "symbol" not in out
+    assert "decoded" not in out
+
+
+def test_a_missing_robot_is_named_with_what_would_help(audit, folder):
+    code, out, _ = audit(folder / "sent/robot0.tum", *QUICK)
+    assert code == 4
+    assert out.startswith("inconclusive:")
+    assert "Not seen: symbol 1, which robot1 sends" in out
+    assert "warning: no track shows robot1" in out
+
+
+def test_json_fits_the_schema_whatever_the_verdict(audit, folder):
+    for code, path in ((0, "sent"), (3, "silent"), (4, "sent/robot0.tum")):
+        got, out, _ = audit(folder / path, *QUICK, "--json")
+        answer = json.loads(out)
+        assert got == code
+        jsonschema.Draft202012Validator(SCHEMA).validate(answer)
+        assert answer["verdict"] == {0: "decoded", 3: "absent", 4: "inconclusive"}[code]
+        assert (answer["message"], answer["message_bits"]) == ((13, "0b1101") if code == 0 else (None, None))
+        assert [entry["symbol"] for entry in answer["symbols"]] == {0: [3, 1], 3: [], 4: [3, None]}[code]
+        assert answer["decoys"]["count"] == 30
+        assert answer["recording"]["frames"] == 1001
+
+
+def test_the_schema_is_one_and_would_notice(audit, folder):
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    answer = json.loads(audit(folder / "sent", *QUICK, "--json")[1])
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(answer | {"message": None}, SCHEMA)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({name: answer[name] for name in answer if name != "p_value"}, SCHEMA)
+
+
+def test_the_documented_fields_are_those_of_the_schema():
+    text = (ROOT / "docs/decode-json.md").read_text(encoding="utf-8")
+    for name in [*SCHEMA["properties"], *SCHEMA["properties"]["channels"]["items"]["properties"]]:
+        assert f"`{name}`" in text, f"docs/decode-json.md does not describe {name}"
+
+
+def test_an_explanation_goes_through_all_stages(audit, folder):
+    code, out, _ = audit(folder / "sent", *QUICK, "--explain")
+    assert code == 0
+    heads = [line.split()[0] for line in out.partition("\n\n")[0].splitlines() if not line.startswith(" ")]
+    assert heads == ["key", "recording", "tracks", "glimpse", "timing", "detector", "symbols", "message", "verdict"]
+    assert "FAILED" not in out
+
+
+def test_an_explanation_says_where_it_failed(audit, folder):
+    _, out, _ = audit(folder / "silent", *QUICK, "--explain")
+    assert "verdict    FAILED: absent" in out
+    _, out, _ = audit(folder / "sent/robot0.tum", *QUICK, "--explain")
+    assert "symbols    FAILED: 1 of 2 are below 95%" in out
+    assert "try: record longer" in out
+
+
+def test_an_explanation_stops_where_an_error_stopped_it(audit, folder):
+    code, out, err = audit(folder / "sent", "--onset", "5", "--explain")
+    assert (code, out) == (1, "")
+    assert "tracks     robot0: seen in 1001 of 1001 samples" in err
+    assert "timing     FAILED: the recording of 'robot0' holds no whole window of 8 s" in err
+    code, out, err = audit(folder / "sent/robot0.tum", folder / "nothing.tum", "--explain")
+    assert "recording  FAILED: there is no file" in err
+    code, out, err = audit(folder / "sent", "--assign", "robot0=red", "--explain")
+    assert "tracks     FAILED: the recording has no track 'red'" in err
+
+
+def test_an_explanation_stays_out_of_the_json(audit, folder):
+    _, out, err = audit(folder / "sent", *QUICK, "--explain", "--json")
+    assert json.loads(out)["message"] == 13
+    assert "timing" in err
+
+
+@pytest.mark.parametrize(("name", "code"), [("sent", 0), ("silent", 3), ("sent/robot0.tum", 4)])
+def test_a_decode_is_drawn(audit, folder, tmp_path, name, code):
+    picture = tmp_path / "decode.png"
+    assert audit(folder / name, *QUICK, "--plot", picture)[0] == code
+    assert picture.read_bytes().startswith(PNG)
+    assert list(tmp_path.iterdir()) == [picture]
+
+
+def test_a_picture_that_cannot_be_written_is_refused_before_the_work(audit, folder, tmp_path, monkeypatch):
+    monkeypatch.setattr("mtm_audit.commands.decode.decode_tracks", lambda *_: pytest.fail("worked first"))
+    refused(audit(folder / "sent", "--plot", tmp_path / "decode.bmp"), "end the name in .png, .pdf, .svg")
+    refused(audit(folder / "sent", "--plot", tmp_path / "nowhere/decode.png"), "choose a folder that exists")
+    (tmp_path / "folder.png").mkdir()
+    refused(audit(folder / "sent", "--plot", tmp_path / "folder.png"), "is a folder")
+
+
+def test_a_drawing_that_breaks_off_leaves_the_former_picture(audit, folder, tmp_path, monkeypatch):
+    def interrupted(*_args, **_kwargs):
+        raise KeyboardInterrupt
+
+    picture = tmp_path / "decode.png"
+    picture.write_bytes(b"the former one")
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", interrupted)
+    code, out, _ = audit(folder / "sent", *QUICK, "--plot", picture, "--json")
+    assert (code, out) == (130, "")
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("decode.png", b"the former one")]
+
+
+def test_an_interrupt_ends_with_130_and_no_answer(audit, folder, monkeypatch):
+    def interrupted(*_args, **_kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mtm_audit.commands.decode.decode_tracks", interrupted)
+    code, out, err = audit(folder / "sent", "--json")
+    assert (code, out) == (130, "")
+    assert "interrupted" in err
+
+
+def run_program(*arguments, **options):
+    command = [sys.executable, "-c", "from mtm_audit.cli import main; main()", *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+
+def test_control_c_during_the_work_leaves_nothing_half_done(folder, tmp_path):
+    busy = run_program(
+        "decode", folder / "sent", "--key", folder / "robot.key", "--json", "--decoys", "100000",
+        "--plot", tmp_path / "decode.png",
+    )  # fmt: skip
+    # Loading takes a moment; what comes before it must end well, too, so the exact instant does not matter.
+    time.sleep(1.5)
+    busy.send_signal(signal.SIGINT)
+    out, _ = busy.communicate(timeout=30)
+    assert busy.returncode in (130, -signal.SIGINT)
+    assert out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("missing.tum", None, "there is no file"),
+        ("empty.tum", b"", "is empty"),
+        ("empty.mp4", b"", "is empty"),
+        ("text.mp4", b"this is no video", "is not a video that can be read"),
+        ("zeros.bin", bytes(5000), "is not a video that can be read"),
+        ("unsorted.csv", b"time,x,y\n0,0,0\n2,0,0\n1,0,0\n", "line 4: time 1.000000 s does not come after"),
+        ("repeated.csv", b"time,x,y\n0,0,0\n1,0,0\n1,0,0\n", "line 4: time 1.000000 s does not come after"),
+        ("words.csv", b"time,x,y\n0,zero,0\n", "line 2: expected 3 numbers"),
+        ("other.csv", b"t,a,b\n0,0,0\n", "the header lacks the column 'time'"),
+        ("short.tum", b"0 0 0 0 0 0 0\n", "line 1: expected 8 numbers"),
+        ("brief.csv", b"time,x,y\n0,0,0\n", "at least 3 are needed"),
+    ],
+)
+def test_a_recording_that_is_none_is_refused_in_one_sentence(audit, tmp_path, name, content, words):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    refused(audit(tmp_path / name, "--assign", "robot0=brief"), words)
+
+
+def test_a_folder_without_recordings_is_refused(audit, tmp_path):
+    refused(audit(tmp_path), "holds no motion-capture file")
+
+
+def test_two_files_of_one_body_are_refused(audit, folder):
+    refused(audit(folder / "sent", folder / "silent/robot0.tum"), "two files are of the body 'robot0'")
+
+
+@pytest.fixture
+def video(tmp_path):
+    """A video without a robot."""
+    gray = np.full((96, 128, 3), 128, dtype=np.uint8)
+    write_video([Frame(number / 30, gray) for number in range(20)], tmp_path / "empty_room.mp4")
+    return tmp_path / "empty_room.mp4"
+
+
+def test_a_video_without_a_robot_is_refused(audit, video):
+    refused(audit(video), "no marker found in 20 frames")
+    refused(audit(video, "--tracker", "colour:red"), "none of red found in 20 frames")
+
+
+def test_a_video_comes_alone(audit, video, folder):
+    refused(audit(video, folder / "sent"), "decode one video at a time")
+
+
+def test_a_truncated_video_is_refused(audit, video):
+    video.write_bytes(video.read_bytes()[:200])
+    refused(audit(video), "holds no video stream")
+
+
+def test_names_that_do_not_exist_are_refused_with_those_that_do(audit, folder):
+    refused(audit(folder / "sent", "--tracker", "eyes"), "choose one of: aruco")
+    refused(audit(folder / "sent", "--detector", "guessing"), "choose one of: coherency")
+    refused(audit(folder / "sent", "--assign", "arm=robot0"), "its bodies are: robot0, robot1")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: text[:40], "is not valid TOML"),
+        (lambda text: text.replace("version = 1", "version = 9"), "the scheme is of version 9"),
+        (lambda text: text.replace("secret", "secrets"), "unknown field 'secrets'"),
+        (lambda text: text.replace(FAKE_SECRET.hex(), "00ff"), "64 hexadecimal digits"),
+    ],
+)
+def test_a_malformed_key_is_refused_without_showing_it(audit, folder, tmp_path, change, words):
+    path = tmp_path / "bad.key"
+    path.write_text(change((folder / "robot.key").read_text(encoding="utf-8")), encoding="utf-8")
+    path.chmod(0o600)
+    refused(audit(folder / "sent", key=path), words)
+
+
+def test_a_key_that_others_can_read_is_refused(audit, folder, tmp_path):
+    path = tmp_path / "open.key"
+    path.write_bytes((folder / "robot.key").read_bytes())
+    path.chmod(0o644)
+    refused(audit(folder / "sent", key=path), "can be read by others (mode 0644); run: chmod 600")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--onset", "soon"), ("--onset", "nan"), ("--onset", "inf"), ("--assign", "robot0"), ("--assign", "=red"),
+        ("--assign", "robot0="), ("--assign", "robot0=a", "--assign", "robot0=b"), ("--decoys", "3"),
+        ("--threshold", "2"), ("--nothing",),
+    ],
+)  # fmt: skip
+def test_a_wrong_use_ends_with_2(audit, folder, arguments):
+    code, out, err = audit(folder / "sent", *arguments)
+    assert (code, out) == (2, "")
+    assert "Error" in err
+
+
+def test_gaps_and_nan_in_motion_capture_are_missing_data(audit, folder, tmp_path):
+    for number in range(2):
+        lines = (folder / f"sent/robot{number}.tum").read_text(encoding="utf-8").splitlines()
+        lines[300] = f"{lines[300].split()[0]} nan nan nan 0 0 0 1"
+        kept = [line for row, line in enumerate(lines) if not 500 <= row < 560]
+        (tmp_path / f"robot{number}.tum").write_text("\n".join(kept), encoding="utf-8")
+    code, out, _ = audit(tmp_path, *QUICK)
+    assert (code, out.splitlines()[0]) == (0, "decoded: message 13 (0b1101)")
+
+
+def test_a_recording_too_short_for_a_window_is_refused(audit, folder, tmp_path):
+    for number in range(2):
+        lines = (folder / f"sent/robot{number}.tum").read_text(encoding="utf-8").splitlines()
+        (tmp_path / f"robot{number}.tum").write_text("\n".join(lines[:300]), encoding="utf-8")
+    refused(audit(tmp_path), "holds no whole window of 8 s")
+
+
+def test_help_loads_nothing_heavy_and_names_the_exit_codes():
+    script = (
+        "import sys\nfrom mtm_audit.cli import main\n"
+        "try:\n    main(sys.argv[1:])\nexcept SystemExit as left:\n    code = left.code\n"
+        "heavy = {'cv2', 'scipy', 'matplotlib', 'numpy', 'av', 'filterpy'} & sys.modules.keys()\n"
+        "assert not heavy and not code, (heavy, code)\n"
+    )
+    for arguments in (["--help"], ["decode", "--help"], ["--version"]):
+        done = subprocess.run(
+            [sys.executable, "-W", "error", "-c", script, *arguments], capture_output=True, text=True, check=False,
+            env=os.environ | {"COLUMNS": "200"},
+        )  # fmt: skip
+        assert (done.returncode, done.stderr) == (0, "")
+        if arguments == ["decode", "--help"]:
+            codes = "0 decoded, 3 no message of this key, 4 inconclusive, 1 error, 2 usage, 130 interrupted"
+            assert codes in " ".join(done.stdout.split())
+        if arguments == ["--version"]:
+            assert done.stdout.startswith("mtm-audit ")
+
+
+def test_small_products_are_left_to_one_thread(monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    with pytest.raises(SystemExit):
+        main(["--version"])
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
