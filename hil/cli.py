@@ -124,6 +124,9 @@ def _reported() -> Iterator["Console"]:
     except MtmError as error:
         print(f"mtm-hil: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
+    except OSError as error:
+        print(f"mtm-hil: the system refused ({error}); check disk space and permissions", file=sys.stderr)
+        raise typer.Exit(1) from error
     except KeyboardInterrupt as error:
         raise typer.Exit(130) from error
     finally:

@@ -68,10 +68,10 @@ class OnboardProcess:
         """Whether it has not ended."""
         return self._process.poll() is None
 
-    def check(self) -> None:
-        """Raise MtmError when it has ended with an error."""
+    def check(self, *, may_have_ended: bool) -> None:
+        """Raise MtmError when it has ended with an error, or at all although it may not have."""
         code = self._process.poll()
-        if code:
+        if code or (code == 0 and not may_have_ended):
             words = (self._folder / f"{self.name}.log").read_text(encoding="utf-8", errors="replace").strip()
             raise MtmError(f"mtm-onboard of {self.name} ended with code {code} ({words[-300:] or 'it said nothing'})")
 

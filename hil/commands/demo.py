@@ -50,7 +50,7 @@ def demo(out: Path, console: Console) -> bool:
     Raises MtmError when `out` exists or one of the programs fails.
     """
     with new_folder(out) as folder:
-        console.print(f"in {out}, with the programs that a user would call:", highlight=False)
+        print(f"in {out}, with the programs that a user would call:")
         _run_all(
             folder, [f"mtm-onboard keygen --preset robomaster-fleet --id {name} --out {name}.key" for name in _KEYS]
         )

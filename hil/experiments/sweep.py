@@ -5,12 +5,14 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hil.experiments.cells import Cell, CellStore, Scalar, Values
+from mtm_onboard.protocol import MtmError
 
 # A function of a module, so that it can be named in another process: parameters and seed to the cell's result.
 Compute = Callable[[Values, int], Mapping[str, Scalar]]
@@ -24,7 +26,8 @@ def run_sweep(
     """The result of each cell, in order; finished ones come from the store and new ones go there at once.
 
     `workers` processes with one numerical thread each (None: as many as there are cores; 1: this process alone). An
-    interrupt loses the cells being computed and no other. The first exception of a cell ends the sweep.
+    interrupt loses the cells being computed and no other. The first exception of a cell ends the sweep; raises MtmError
+    when a process is ended from outside.
     """
     missing = [cell for cell in {cell.name: cell for cell in cells}.values() if store.find(cell) is None]
     count = len(os.sched_getaffinity(0)) if workers is None else workers
@@ -54,6 +57,8 @@ def _in_processes(compute: Compute, cells: Sequence[Cell], workers: int) -> Iter
             futures = {pool.submit(compute, dict(cell.parameters), cell.seed): cell for cell in cells}
             for future in as_completed(futures):
                 yield futures[future], future.result()
+        except BrokenProcessPool as error:
+            raise MtmError("a worker process was ended from outside; run it again, finished cells are kept") from error
         finally:
             pool.shutdown(cancel_futures=True)
 

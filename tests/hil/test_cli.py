@@ -1,6 +1,9 @@
+import errno
 import json
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -9,6 +12,7 @@ from hil.cli import CameraName, main
 from hil.experiments.calibrate import SLIPS_MPS
 from hil.experiments.paper_figures import MARGINS
 from hil.lockstep import run_lockstep
+from hil.programs import program
 from mtm_audit.recordings.motion_capture import read_tum
 from mtm_audit.recordings.video import read_frames
 from mtm_onboard.protocol import load_key
@@ -119,6 +123,30 @@ def test_help_loads_neither_opencv_nor_scipy():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "--no-video" in done.stdout
     assert not {"cv2", "scipy", "can", "numpy"} & set(done.stdout.split())
+
+
+@pytest.mark.parametrize(("request_to_end", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_program_that_is_asked_to_end_leaves_nothing(tmp_path, request_to_end, code):
+    wanted = ["record", "--no-message", "--seconds", "5000", "--out", str(tmp_path / "a")]
+    started = subprocess.Popen([program("mtm-hil"), *wanted], stderr=subprocess.PIPE)
+    deadline_s = time.monotonic() + 20.0
+    while not list(tmp_path.iterdir()):
+        assert time.monotonic() < deadline_s
+        time.sleep(0.02)
+    started.send_signal(request_to_end)
+    _, error = started.communicate(timeout=20.0)
+    assert (started.returncode, error) == (code, b"")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_gets_one_sentence(tmp_path, monkeypatch, capfd):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("hil.commands.record.write_recording", full)
+    assert run(*QUICK, "--no-message", "--out", tmp_path / "a") == 1
+    assert capfd.readouterr().err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.fixture

@@ -32,3 +32,15 @@ def test_what_exists_is_never_touched(tmp_path):
     with pytest.raises(MtmError, match="cannot make"), new_folder(tmp_path / "file" / "a"):
         pass
     assert (tmp_path / "file").read_text() == "kept"
+
+
+def test_a_folder_that_appears_meanwhile_is_left_alone(tmp_path):
+    def make():
+        with new_folder(tmp_path / "a"):
+            (tmp_path / "a").mkdir()
+            (tmp_path / "a" / "file").write_text("kept")
+
+    with pytest.raises(MtmError, match="meanwhile"):
+        make()
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+    assert (tmp_path / "a" / "file").read_text() == "kept"

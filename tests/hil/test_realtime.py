@@ -60,3 +60,13 @@ def test_a_program_that_fails_ends_the_run_with_its_own_words(tmp_path):
     (tmp_path / "robot.key").chmod(0o600)
     with pytest.raises(MtmError, match="mtm-onboard of robot0 ended with code 1.*robot.key is not valid TOML"):
         run_realtime(replace(settings, symbols=None), tmp_path / "robot.key", tmp_path)
+
+
+@pytest.mark.realtime
+def test_a_program_that_ends_early_ends_the_run(tmp_path, monkeypatch):
+    early = tmp_path / "mtm-onboard"
+    early.write_text("#!/bin/sh\necho gone\n")
+    early.chmod(0o755)
+    monkeypatch.setattr("hil.onboard_process.program", lambda _: str(early))
+    with pytest.raises(MtmError, match=r"mtm-onboard of robot0 ended with code 0 \(gone\)"):
+        run_realtime(short_run(seconds=6.0, start_s=3.5), tmp_path / "robot.key", tmp_path)

@@ -1,12 +1,14 @@
 import importlib
 import io
 import os
+import sys
 
 import pytest
 from rich.console import Console
 
 from hil.experiments.cells import Cell, CellStore
 from hil.experiments.sweep import run_sweep
+from mtm_onboard.protocol import MtmError
 
 QUIET = Console(file=io.StringIO())
 
@@ -17,19 +19,27 @@ import os
 
 def square(parameters, seed):
     return {"square": parameters["x"] ** 2 + seed, "process": os.getpid(), "threads": os.environ["OMP_NUM_THREADS"]}
+
+def ended_from_outside(parameters, seed):
+    os._exit(1)
 """
+
+
+@pytest.fixture
+def module(tmp_path, monkeypatch):
+    (tmp_path / "cells_of_a_test.py").write_text(MODULE)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "cells_of_a_test", raising=False)
+    return importlib.import_module("cells_of_a_test")
 
 
 def cells(count):
     return [Cell("squares", {"x": number}, number % 3) for number in range(count)]
 
 
-def test_results_come_in_the_order_of_the_cells_from_other_processes(tmp_path, monkeypatch):
-    (tmp_path / "squares_of_a_test.py").write_text(MODULE)
-    monkeypatch.syspath_prepend(tmp_path)
-    square = importlib.import_module("squares_of_a_test").square
+def test_results_come_in_the_order_of_the_cells_from_other_processes(module, tmp_path):
     with CellStore(tmp_path / "cells.jsonl") as store:
-        results = run_sweep(square, cells(6), store, QUIET, workers=2)
+        results = run_sweep(module.square, cells(6), store, QUIET, workers=2)
     assert [result["square"] for result in results] == [number**2 + number % 3 for number in range(6)]
     assert os.getpid() not in {result["process"] for result in results}
     assert {result["threads"] for result in results} == {"1"}
@@ -61,3 +71,8 @@ def test_a_cell_that_is_asked_for_twice_is_computed_once(tmp_path):
     with CellStore(tmp_path / "cells.jsonl") as store:
         assert run_sweep(count, [*cells(1), *cells(1)], store, QUIET, workers=1) == [{"n": 1}, {"n": 1}]
     assert calls == [0]
+
+
+def test_a_process_that_is_ended_from_outside_gets_one_sentence(module, tmp_path):
+    with CellStore(tmp_path / "cells.jsonl") as store, pytest.raises(MtmError, match="finished cells are kept"):
+        run_sweep(module.ended_from_outside, cells(2), store, QUIET, workers=2)
