@@ -1,6 +1,7 @@
 """The glimpse: observed motion as mean velocities over the intervals between observations."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -32,6 +33,12 @@ class Glimpse:
         """Length of each interval, shape (n,)."""
         return np.diff(self.edges_s)
 
+    @cached_property
+    def displacements(self) -> Floats:
+        """Position at each edge relative to the first, shape (n + 1, axes)."""
+        steps = self.velocities * self.durations_s[:, None]
+        return np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+
 
 def glimpse_of_track(track: Track) -> Glimpse:
     """Difference a track's valid positions.
@@ -54,8 +61,13 @@ def tick_velocities(glimpse: Glimpse, first_tick_s: float, rate_hz: float, ticks
     Positions are interpolated linearly at the ticks (through gaps as well) and differenced, so nothing aliases
     that the recording had averaged out. Outside the recording the body stands still.
     """
-    steps = glimpse.velocities * glimpse.durations_s[:, None]
-    positions = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
-    instants_s = first_tick_s + np.arange(ticks + 1) / rate_hz
-    columns = [np.interp(instants_s, glimpse.edges_s, positions[:, axis]) for axis in range(positions.shape[1])]
-    return np.diff(np.stack(columns, axis=1), axis=0) * rate_hz
+    velocities: Floats = tick_velocities_at_rates(glimpse, np.array([first_tick_s]), np.array([rate_hz]), ticks)[0].T
+    return velocities
+
+
+def tick_velocities_at_rates(glimpse: Glimpse, first_ticks_s: Floats, rates_hz: Floats, ticks: int) -> Floats:
+    """`tick_velocities` for several rates at once, each from its own first tick on: shape (rates, axes, ticks)."""
+    instants_s = first_ticks_s[:, None] + np.arange(ticks + 1) / rates_hz[:, None]
+    columns = [np.interp(instants_s, glimpse.edges_s, column) for column in glimpse.displacements.T]
+    velocities: Floats = np.diff(np.stack(columns, axis=1), axis=-1) * rates_hz[:, None, None]
+    return velocities

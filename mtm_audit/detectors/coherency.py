@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mtm_audit.detectors.base import Reading, combine_repeats, whole_windows
 from mtm_audit.detectors.welch import Complexes, mean_coherency, segment_spectra
-from mtm_audit.glimpse import Glimpse, tick_velocities
+from mtm_audit.glimpse import Glimpse, tick_velocities_at_rates
 from mtm_audit.timing import RATE_SCALES, Timing, find_onset, plan_onset_search
 from mtm_audit.tracks import Floats
 from mtm_onboard.protocol.codebook import Codebook
@@ -130,11 +130,9 @@ def _reference_spectra(codebooks: Sequence[Codebook], channel: Channel, window: 
 def _observed_spectra(glimpse: Glimpse, codebook: Codebook, channel: Channel, onset_s: float, window: int) -> Complexes:
     scheme = codebook.scheme
     ticks = scheme.window_ticks(channel)
-    observed = [
-        tick_velocities(glimpse, onset_s + window * ticks / rate_hz, float(rate_hz), ticks).T
-        for rate_hz in scheme.rate_hz * RATE_SCALES
-    ]
-    return segment_spectra(np.stack(observed), codebook.bins(channel))
+    rates_hz = scheme.rate_hz * RATE_SCALES
+    observed = tick_velocities_at_rates(glimpse, onset_s + window * ticks / rates_hz, rates_hz, ticks)
+    return segment_spectra(observed, codebook.bins(channel))
 
 
 def _axes(channel: Channel, glimpse: Glimpse) -> Glimpse:
