@@ -5,6 +5,10 @@ from pathlib import Path
 
 from mtm_onboard.protocol import MtmError
 
+# Numerical libraries read these when they are loaded. Where several processes compute at once, more threads than
+# cores only get in each other's way.
+SINGLE_THREADED = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+
 
 def program(name: str) -> str:
     """Path of an installed program such as mtm-audit; raises MtmError when it is not there."""

@@ -1,6 +1,7 @@
 """`mtm-hil demo`: the whole way of a message, from a fresh key to the auditor's verdicts."""
 
 import json
+import os
 import shlex
 import subprocess
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hil.newfolder import new_folder
-from hil.programs import program
+from hil.programs import SINGLE_THREADED, program
 from mtm_onboard.protocol import MtmError
 
 MESSAGE = 0b10110010
@@ -67,10 +68,13 @@ def _run_all(folder: Path, commands: Sequence[str], codes: tuple[int, ...] = (0,
 
     Raises MtmError when one ends with an exit code that is not among `codes`.
     """
+    environment = os.environ | SINGLE_THREADED
 
     def run(command: str) -> str:
         name, *arguments = shlex.split(command)
-        done = subprocess.run([program(name), *arguments], cwd=folder, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [program(name), *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=False
+        )
         if done.returncode not in codes:
             words = done.stderr.strip().splitlines()
             raise MtmError(

@@ -12,12 +12,11 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hil.experiments.cells import Cell, CellStore, Scalar, Values
+from hil.programs import SINGLE_THREADED
 from mtm_onboard.protocol import MtmError
 
 # A function of a module, so that it can be named in another process: parameters and seed to the cell's result.
 Compute = Callable[[Values, int], Mapping[str, Scalar]]
-
-_THREAD_LIMITS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def run_sweep(
@@ -69,9 +68,8 @@ def _leave_interrupts_to_the_parent() -> None:
 
 @contextmanager
 def _single_threaded_children() -> Iterator[None]:
-    """Numerical libraries read these variables when a child loads them; more threads than cores only get in the way."""
-    former = {name: os.environ.get(name) for name in _THREAD_LIMITS}
-    os.environ.update(dict.fromkeys(_THREAD_LIMITS, "1"))
+    former = {name: os.environ.get(name) for name in SINGLE_THREADED}
+    os.environ.update(SINGLE_THREADED)
     try:
         yield
     finally:
