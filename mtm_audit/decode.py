@@ -45,6 +45,14 @@ class ChannelDecoding:
     reading: Reading | None
     posteriors: Floats
 
+    @property
+    def onset_s(self) -> float | None:
+        """First instant in the recording at which the message starts; repeats of it start later."""
+        if self.reading is None:
+            return None
+        starts_s = self.reading.window_starts_s[self.reading.window_positions == 0]
+        return float(starts_s[0]) if len(starts_s) else self.reading.timing.onset_s
+
 
 @dataclass(frozen=True)
 class Decoding:

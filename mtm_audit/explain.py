@@ -116,7 +116,7 @@ def _timing_line(channel: ChannelDecoding, decoding: Decoding) -> str:
         return f"{channel.channel.name}: not read"
     how = "given" if decoding.settings.onset_s is not None else "found"
     return (
-        f"{channel.channel.name}: a message begins at {reading.timing.onset_s:.3f} s ({how}), ticks at "
+        f"{channel.channel.name}: the message begins at {channel.onset_s:.3f} s ({how}), ticks at "
         f"{reading.timing.rate_hz:.2f} Hz"
     )
 

@@ -66,7 +66,7 @@ def _channel(decoding: ChannelDecoding) -> dict[str, Any]:
         "name": channel.name,
         "body": channel.body,
         "track": None if glimpse is None else glimpse.name,
-        "onset_s": None if reading is None else reading.timing.onset_s,
+        "onset_s": decoding.onset_s,
         "rate_hz": None if reading is None else reading.timing.rate_hz,
         "windows": 0 if reading is None else len(reading.window_positions),
         "scores": None if reading is None else reading.scores.tolist(),

@@ -89,7 +89,7 @@ def _symbol_table(decoding: Decoding) -> Table:
         if reading is None:
             table.add_row(*head, "-", "-", "0", "-", "-", "-", "-", "-")
             continue
-        head += [f"{reading.timing.onset_s:.2f}", f"{reading.timing.rate_hz:.2f}"]
+        head += [f"{channel.onset_s:.2f}", f"{reading.timing.rate_hz:.2f}"]
         for position in range(channel.channel.symbols):
             windows = int(np.sum(reading.window_positions == position))
             symbol = decoding.symbols[first + position]
