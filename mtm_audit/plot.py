@@ -81,8 +81,12 @@ def _draw_tracks(axes: Axes, tracks: tuple[Track, ...]) -> None:
 
 def _draw_scores(axes: Axes, decoding: Decoding) -> None:
     names, table = _score_table(decoding)
-    # The scale reaches well above the common score, so that scores which hardly differ look so.
-    low, high = 0.9 * float(table.min()), max(float(table.max()), 1.6 * float(np.median(table)))
+    low, high = float(table.min()), float(table.max())
+    low -= 0.1 * abs(low)
+    marked = decoding.verdict != "absent"
+    if not marked:
+        # The scale reaches well above the common score, so that scores which hardly differ look so.
+        high = max(high, 1.6 * float(np.median(table)))
     image = axes.imshow(table, aspect="auto", cmap="Blues", vmin=low, vmax=high)
     axes.figure.colorbar(image, ax=axes, shrink=0.85, label="score")
     best = np.argmax(table, axis=1)
@@ -90,7 +94,6 @@ def _draw_scores(axes: Axes, decoding: Decoding) -> None:
         for (row, symbol), score in np.ndenumerate(table):
             colour = "white" if score > (low + high) / 2.0 else "#344054"
             axes.text(symbol, row, f"{score:.2f}", ha="center", va="center", fontsize=9, color=colour)
-    marked = decoding.verdict != "absent"
     if marked:
         axes.plot(best, np.arange(len(best)), "s", markersize=26 if len(best) <= 6 else 10, markerfacecolor="none",
                   markeredgecolor="#e4572e", markeredgewidth=2.0)  # fmt: skip
@@ -119,7 +122,8 @@ def _draw_margins(axes: Axes, decoding: Decoding) -> None:
     if len(names) <= _PLACES_NAMED:
         for row, (second, first) in enumerate(ranked[:, -2:]):
             axes.text(first, row, f" +{first - second:.2f}", va="center", fontsize=9, color="#344054")
-    axes.set(title="How far the best symbol is ahead", xlabel="score", xlim=(0.0, 1.15 * float(ranked.max())))
+    axes.set(title="How far the best symbol is ahead", xlabel="score")
+    axes.margins(x=0.15)
     axes.invert_yaxis()
     _legend_below(axes)
     _name_places(axes, names)
