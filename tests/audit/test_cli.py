@@ -1,3 +1,4 @@
+import inspect
 import json
 import os
 import signal
@@ -13,7 +14,8 @@ import pytest
 
 from hil.sensors.motion_capture import write_tum
 from hil.sensors.video import write_video
-from mtm_audit.cli import main
+from mtm_audit.cli import decode, main
+from mtm_audit.decode import DecodeSettings
 from mtm_audit.recordings.frames import Frame
 from mtm_onboard.protocol import save_key
 from tests.audit.moving_robot import FAKE_SECRET, OTHER_SECRET, key_of, robot_track, scheme_of
@@ -334,6 +336,13 @@ def test_a_recording_too_short_for_a_window_is_refused(audit, folder, tmp_path):
         lines = (folder / f"sent/robot{number}.tum").read_text(encoding="utf-8").splitlines()
         (tmp_path / f"robot{number}.tum").write_text("\n".join(lines[:300]), encoding="utf-8")
     refused(audit(tmp_path), "holds no whole window of 8 s")
+
+
+def test_the_command_line_s_defaults_are_the_decoder_s():
+    asked, settings = inspect.signature(decode).parameters, DecodeSettings()
+    for name in ("detector", "decoys", "threshold"):
+        assert asked[name].default == getattr(settings, name)
+    assert (asked["onset"].default, settings.onset_s) == ("auto", None)
 
 
 def test_help_loads_nothing_heavy_and_names_the_exit_codes():
