@@ -269,6 +269,13 @@ def test_a_video_without_a_robot_is_refused(audit, video):
     refused(audit(video, "--tracker", "colour:red"), "none of red found in 20 frames")
 
 
+def test_an_explanation_of_a_video_says_that_nothing_was_found_in_it(audit, video):
+    code, out, err = audit(video, "--explain")
+    assert (code, out) == (1, "")
+    assert f"recording  video {video}, 20 frames" in err
+    assert "tracks     FAILED: no marker found in 20 frames" in err
+
+
 def test_a_video_comes_alone(audit, video, folder):
     refused(audit(video, folder / "sent"), "decode one video at a time")
 
