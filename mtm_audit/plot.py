@@ -93,7 +93,7 @@ def _draw_scores(axes: Axes, decoding: Decoding) -> None:
     if table.size <= _WRITTEN_CELLS:
         for (row, symbol), score in np.ndenumerate(table):
             colour = "white" if score > (low + high) / 2.0 else "#344054"
-            axes.text(symbol, row, f"{score:.2f}", ha="center", va="center", fontsize=9, color=colour)
+            axes.text(symbol, row, _written(score), ha="center", va="center", fontsize=9, color=colour)
     if marked:
         axes.plot(best, np.arange(len(best)), "s", markersize=26 if len(best) <= 6 else 10, markerfacecolor="none",
                   markeredgecolor="#e4572e", markeredgewidth=2.0)  # fmt: skip
@@ -105,7 +105,9 @@ def _draw_scores(axes: Axes, decoding: Decoding) -> None:
 
 def _draw_decoys(axes: Axes, decoding: Decoding) -> None:
     evidence = decoding.evidence
-    axes.hist(evidence.decoy_strengths, bins="auto", color=_QUIET, edgecolor="white", label="decoy keys")
+    axes.hist(
+        evidence.decoy_strengths, bins="auto", color=_QUIET, edgecolor="#8593a6", linewidth=0.6, label="decoy keys"
+    )
     axes.axvline(evidence.strength, color=_VERDICT_COLOURS[decoding.verdict], linewidth=3.0, label="this key")
     axes.set(title="This key against keys that nobody holds", xlabel="strength of the best message", ylabel="keys")
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
@@ -121,7 +123,7 @@ def _draw_margins(axes: Axes, decoding: Decoding) -> None:
     axes.barh(rows, ranked[:, -2], color=_QUIET, height=0.62, label="second best")
     if len(names) <= _PLACES_NAMED:
         for row, (second, first) in enumerate(ranked[:, -2:]):
-            axes.text(first, row, f" +{first - second:.2f}", va="center", fontsize=9, color="#344054")
+            axes.text(first, row, f" +{_written(first - second)}", va="center", fontsize=9, color="#344054")
     axes.set(title="How far the best symbol is ahead", xlabel="score")
     axes.margins(x=0.15)
     axes.invert_yaxis()
@@ -140,6 +142,11 @@ def _score_table(decoding: Decoding) -> tuple[list[str], Floats]:
             names += [channel.channel.name if count == 1 else f"{channel.channel.name}.{n}" for n in range(count)]
             rows.append(channel.reading.scores)
     return names, np.concatenate(rows)
+
+
+def _written(score: float) -> str:
+    """Coherencies lie below one, log-likelihood ratios in the hundreds."""
+    return f"{score:.2f}" if abs(score) < 10.0 else f"{score:.0f}"
 
 
 def _name_places(axes: Axes, names: list[str]) -> None:

@@ -99,7 +99,7 @@ def _symbol_table(decoding: Decoding) -> Table:
             table.add_row(
                 *(head if position == 0 else [""] * len(head)),
                 str(windows), f"{symbol}{doubt}", percent(posterior),
-                f"{best:.3f}", f"{runner_up:.3f}", f"{best - runner_up:.3f}",
+                _score(best), _score(runner_up), _score(best - runner_up),
             )  # fmt: skip
     return table
 
@@ -109,12 +109,12 @@ def _absent_table(decoding: Decoding) -> Table:
     table = _table("channel", "track", "windows", "this key", "decoy keys")
     for channel in decoding.channels:
         windows = 0 if channel.reading is None else len(channel.reading.window_positions)
-        strength = "-" if channel.reading is None else f"{channel.reading.strength:.3f}"
+        strength = "-" if channel.reading is None else _score(channel.reading.strength)
         table.add_row(channel.channel.name, _track_name(channel), str(windows), strength, "")
     evidence = decoding.evidence
     mean, spread = float(np.mean(evidence.decoy_strengths)), float(np.std(evidence.decoy_strengths, ddof=1))
     table.add_section()
-    table.add_row("together", "", "", f"{evidence.strength:.3f}", f"{mean:.3f} ± {spread:.3f}")
+    table.add_row("together", "", "", _score(evidence.strength), f"{_score(mean)} ± {_score(spread)}")
     return table
 
 
@@ -130,6 +130,11 @@ def _with_places(decoding: Decoding) -> list[tuple[ChannelDecoding, int]]:
 def percent(probability: float) -> str:
     """A posterior for reading: never rounded up to certainty."""
     return "> 99.9 %" if probability > 0.999 else f"{100.0 * probability:.1f} %"
+
+
+def _score(score: float) -> str:
+    """Coherencies lie below one, log-likelihood ratios in the hundreds."""
+    return f"{score:.3f}" if abs(score) < 10.0 else f"{score:.1f}"
 
 
 def _track_name(channel: ChannelDecoding) -> str:
