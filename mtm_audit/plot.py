@@ -93,7 +93,7 @@ def _draw_scores(axes: Axes, decoding: Decoding) -> None:
     if table.size <= _WRITTEN_CELLS:
         for (row, symbol), score in np.ndenumerate(table):
             colour = "white" if score > (low + high) / 2.0 else "#344054"
-            axes.text(symbol, row, _written(score), ha="center", va="center", fontsize=9, color=colour)
+            axes.text(symbol, row, _written(float(score)), ha="center", va="center", fontsize=9, color=colour)
     if marked:
         axes.plot(best, np.arange(len(best)), "s", markersize=26 if len(best) <= 6 else 10, markerfacecolor="none",
                   markeredgecolor="#e4572e", markeredgewidth=2.0)  # fmt: skip
