@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from mtm_audit.assignment import assign_tracks
 from mtm_audit.detectors import make_detector
-from mtm_audit.detectors.base import Detector, Reading
+from mtm_audit.detectors.base import Detector, Observation, Reading
 from mtm_audit.glimpse import Glimpse, glimpse_of_track
 from mtm_audit.order import order_is_known
 from mtm_audit.tracks import Floats, Track
@@ -96,24 +97,25 @@ def decode_tracks(
     bodies = assign_tracks(scheme, tracks, settings.assignment)
     glimpses = {body: glimpse_of_track(track) for body, track in bodies.items() if track is not None}
     codebooks = [key.codebook(), *decoy_codebooks(key, settings.decoys)]
-    channels, strengths, refusals = [], np.zeros(len(codebooks)), []
-    for number, channel in enumerate(scheme.channels):
-        if progress is not None:
-            progress(f"reading {channel.name}", number / len(scheme.channels))
-        glimpse = glimpses.get(channel.body)
-        try:
-            readings = None if glimpse is None else detector.read(codebooks, channel, glimpse, settings.onset_s)
-        except MtmError as refusal:
-            refusals.append(refusal)
-            readings = None
-        if readings is not None:
-            strengths += [reading.strength for reading in readings]
-        channels.append(_channel_decoding(detector, channel, glimpse, readings, scheme))
-    read = [decoding for decoding in channels if decoding.reading is not None]
+    observations = [
+        Observation(channel, glimpses[channel.body]) for channel in scheme.channels if channel.body in glimpses
+    ]
+    report = None if progress is None else partial(progress, "reading")
+    results = detector.read(codebooks, observations, settings.onset_s, report)
+    read = {
+        observation.channel.name: result
+        for observation, result in zip(observations, results, strict=True)
+        if not isinstance(result, MtmError)
+    }
     if not read:
-        raise refusals[0] if refusals else MtmError("no channel of the scheme is in the recording")
-    maxima = sum(len(decoding.posteriors) for decoding in read)
-    evidence = weigh(strengths[0] / len(read), strengths[1:] / len(read), maxima)
+        raise next(result for result in results if isinstance(result, MtmError))
+    channels = [
+        _channel_decoding(detector, channel, glimpses.get(channel.body), read.get(channel.name), scheme)
+        for channel in scheme.channels
+    ]
+    strengths = np.sum([[reading.strength for reading in readings] for readings in read.values()], axis=0) / len(read)
+    maxima = sum(readings[0].maxima for readings in read.values())
+    evidence = weigh(float(strengths[0]), strengths[1:], maxima)
     posteriors, symbols = _message_symbols(scheme, channels)
     return _decoding(key, settings, tuple(channels), symbols, posteriors, evidence)
 

@@ -1,13 +1,14 @@
 """Tracks: where each observed thing was, and when."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mtm_onboard.protocol.errors import MtmError
 
-Floats = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
 Bools = NDArray[np.bool_]
 
 

@@ -2,9 +2,13 @@
 
 from mtm_audit.detectors.base import Detector
 from mtm_audit.detectors.coherency import CoherencyDetector
+from mtm_audit.detectors.matched.detector import MatchedDetector
 from mtm_onboard.protocol.errors import MtmError
 
-DETECTORS = {"coherency": CoherencyDetector}
+DETECTORS: dict[str, type[CoherencyDetector] | type[MatchedDetector]] = {
+    "coherency": CoherencyDetector,
+    "matched": MatchedDetector,
+}
 
 
 def make_detector(name: str) -> Detector:

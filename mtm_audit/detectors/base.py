@@ -1,6 +1,6 @@
 """What every detector returns, and the interface behind which all of them stand."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -11,6 +11,7 @@ from mtm_audit.glimpse import Glimpse
 from mtm_audit.timing import Timing
 from mtm_audit.tracks import Floats
 from mtm_onboard.protocol.codebook import Codebook
+from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel
 
 
@@ -21,7 +22,8 @@ class Reading:
     `scores` (positions, M): evidence for each symbol at each of the message's l_c positions, all repeats taken
     together; `window_scores` (windows, M) the same for every window seen, `window_positions` (windows,) which
     position each window carries, `window_starts_s` (windows,) when it began. `strength` is the single number that a
-    verdict compares between the key and its decoys: larger means more evidence of any message at all.
+    verdict compares between the key and its decoys: larger means more evidence of any message at all. `maxima` is over
+    how many independent maxima it is a mean or sum.
     """
 
     timing: Timing
@@ -30,10 +32,19 @@ class Reading:
     window_positions: NDArray[np.int64]
     window_starts_s: Floats
     strength: float
+    maxima: int
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One channel and the motion of its body."""
+
+    channel: Channel
+    glimpse: Glimpse
 
 
 class Detector(Protocol):
-    """Scores one channel over a whole recording, for several codebooks at once.
+    """Scores the channels of a recording, for several codebooks at once.
 
     The codebooks (the key's own and its decoys') share one scheme. `onset_s` is when the message began, or None
     when that is searched for too; everything that is searched is searched for each codebook anew.
@@ -42,9 +53,13 @@ class Detector(Protocol):
     name: str
 
     def read(
-        self, codebooks: Sequence[Codebook], channel: Channel, glimpse: Glimpse, onset_s: float | None
-    ) -> list[Reading]:
-        """One reading for each codebook; raises MtmError when the recording is too short for a window."""
+        self,
+        codebooks: Sequence[Codebook],
+        observations: Sequence[Observation],
+        onset_s: float | None,
+        progress: Callable[[float], None] | None = None,
+    ) -> list[list[Reading] | MtmError]:
+        """For each observation one reading a codebook, or why it cannot be read (too short for a window)."""
         ...
 
     def posteriors(self, reading: Reading, decoys: Sequence[Reading]) -> Floats:

@@ -4,12 +4,12 @@ Appendix "Detection Pipeline Details" of the paper: Hann window, nperseg = min(1
 nfft = L, L being the window in ticks; the glimpse is resampled at each candidate rate.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_audit.detectors.base import Reading, combine_repeats, whole_windows
+from mtm_audit.detectors.base import Observation, Reading, combine_repeats, whole_windows
 from mtm_audit.detectors.welch import Complexes, mean_coherency, segment_spectra
 from mtm_audit.glimpse import Glimpse, tick_velocities_at_rates
 from mtm_audit.timing import RATE_SCALES, Timing, find_onset, plan_onset_search
@@ -25,6 +25,24 @@ class CoherencyDetector:
     name = "coherency"
 
     def read(
+        self,
+        codebooks: Sequence[Codebook],
+        observations: Sequence[Observation],
+        onset_s: float | None,
+        progress: Callable[[float], None] | None = None,
+    ) -> list[list[Reading] | MtmError]:
+        """Read the channels one by one; each has its own timing."""
+        results: list[list[Reading] | MtmError] = []
+        for number, observation in enumerate(observations):
+            if progress is not None:
+                progress(number / len(observations))
+            try:
+                results.append(self.read_channel(codebooks, observation.channel, observation.glimpse, onset_s))
+            except MtmError as refusal:
+                results.append(refusal)
+        return results
+
+    def read_channel(
         self, codebooks: Sequence[Codebook], channel: Channel, glimpse: Glimpse, onset_s: float | None
     ) -> list[Reading]:
         """Score every window; without an onset, GCC-PHAT finds one for each codebook at each candidate rate."""
@@ -119,7 +137,7 @@ def _reading(timing: Timing, scores: Floats, positions: NDArray[np.int64], start
     combined = combine_repeats(scores, positions, symbols)
     seen = np.isin(np.arange(symbols), positions)
     strength = float(combined[seen].max(axis=1).mean())
-    return Reading(timing, combined, scores, positions, starts_s, strength)
+    return Reading(timing, combined, scores, positions, starts_s, strength, int(seen.sum()))
 
 
 def _reference_spectra(codebooks: Sequence[Codebook], channel: Channel, window: int) -> list[Complexes]:

@@ -4,11 +4,13 @@ The same numbers as `sqrt(scipy.signal.coherence(x, y, window="hann", nperseg=..
 in-band bins, arranged so that each signal is transformed once and each pair costs one small product.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import get_window
 
-Floats = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
 Complexes = NDArray[np.complex128]
 
 _MAX_SEGMENT = 128

@@ -22,7 +22,7 @@ def glimpse():
 
 def read(key, glimpse, onset_s, decoys=0):
     codebooks = [key.codebook(), *decoy_codebooks(key, decoys)]
-    return CoherencyDetector().read(codebooks, key.scheme.channels[0], glimpse, onset_s)
+    return CoherencyDetector().read_channel(codebooks, key.scheme.channels[0], glimpse, onset_s)
 
 
 def test_the_sent_symbols_score_best(glimpse):

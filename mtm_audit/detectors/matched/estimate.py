@@ -1,0 +1,194 @@
+"""Symbols and plant, estimated together from a broad prior on.
+
+Each window's symbol is judged under what all other windows say about the plant, never under what itself says, so
+that a wrong decision does not confirm itself. Windows of other observations (other robots of a fleet, filmed by the
+same camera) count as one hypothesis beside the one that they are strangers.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, half_log_evidence, log_sum_exp
+from mtm_audit.detectors.matched.motion import Motion
+from mtm_audit.detectors.matched.noise import NoiseModel, fit_noise, model_order
+from mtm_audit.detectors.matched.plants import COARSE, FINE
+from mtm_audit.detectors.matched.windows import Statistics, Window, response_rows, statistics
+from mtm_audit.tracks import Floats
+
+_ROUNDS = 3
+_KEPT = 64
+
+
+@dataclass
+class _Judged:
+    """The running state of one window: its kept candidates and what is believed of them."""
+
+    window: Window
+    kept: np.ndarray
+    rows: Floats
+    ratios: Floats  # (L,) log-likelihood ratios of the kept candidates, nats
+    first_pass: Floats  # (M,) log-likelihood ratios of all candidates under the prior alone
+    belief: Floats  # (L,) probabilities of the kept candidates, all repeats taken together
+    signal: Floats  # (observed axes, n) expected contribution to the motion
+
+
+def fit_recording_noise(motions: Sequence[Motion], signals: Sequence[Floats]) -> NoiseModel:
+    """The noise model of what `signals` hold, with an order that so many samples carry."""
+    samples = sum(signal.size for signal in signals)
+    return fit_noise(signals, [motion.seen for motion in motions], model_order(samples))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """`ratios`: for each window log-likelihood ratios (M,) in nats, this waveform against none; `signals`: what each
+    window is expected to add to the motion, (observed axes, n); `residuals`: each observation's motion less all of
+    them; `noise`: the interference as it is known in the end.
+    """
+
+    ratios: tuple[Floats, ...]
+    signals: tuple[Floats, ...]
+    residuals: tuple[Floats, ...]
+    noise: NoiseModel
+
+
+def estimate(windows: Sequence[Window], motions: Sequence[Motion], noise: NoiseModel) -> Estimate:
+    """Decide all windows of all observations; `noise` is a first model, fitted to the motion itself."""
+    judged = [_first_pass(window, motions[window.observation], noise) for window in windows]
+    _keep_best(judged)
+    for _ in range(_ROUNDS):
+        _believe(judged)
+        found = _all_statistics(judged, motions, noise)
+        for _ in range(2):
+            hypotheses = _judge(judged, found)
+            _believe(judged)
+        _expect_signals(judged, hypotheses, noise)
+        residuals = _residuals(judged, motions)
+        noise = fit_recording_noise(motions, residuals)
+    ratios, signals = zip(*[(_all_candidates(state), state.signal) for state in judged], strict=True)
+    return Estimate(ratios, signals, tuple(residuals), noise)
+
+
+def _residuals(judged: Sequence[_Judged], motions: Sequence[Motion]) -> list[Floats]:
+    """Each observation's motion less what all its windows are expected to add."""
+    residuals = [motion.velocities.copy() for motion in motions]
+    for state in judged:
+        residuals[state.window.observation][:, state.window.first : state.window.last] -= state.signal
+    return residuals
+
+
+def _first_pass(window: Window, motion: Motion, noise: NoiseModel) -> _Judged:
+    found = statistics(window, window.tones, response_rows(window, COARSE), noise, motion.velocities)
+    axes = window.tones.shape[1]
+    prior = np.eye(axes) / GAIN_VARIANCE
+    evidence = half_log_evidence(prior + found.precision, found.information).sum(axis=0)
+    constant = found.information.shape[0] * 0.5 * axes * np.log(GAIN_VARIANCE)
+    ratios = log_sum_exp(evidence, axis=1) - constant - np.log(len(COARSE.taps))
+    silent = np.zeros((len(motion.velocities), window.last - window.first))
+    return _Judged(window, np.arange(len(ratios)), response_rows(window, FINE), ratios, ratios, ratios, silent)
+
+
+def _keep_best(judged: Sequence[_Judged]) -> None:
+    """Keep the candidates that look best over all repeats of a symbol."""
+    for members in _groups(judged):
+        total = np.sum([state.first_pass for state in members], axis=0)
+        kept = np.argsort(-total)[:_KEPT]
+        for state in members:
+            state.kept, state.ratios = kept, state.first_pass[kept]
+
+
+def _groups(judged: Sequence[_Judged]) -> list[list[_Judged]]:
+    groups: dict[tuple[int, int], list[_Judged]] = {}
+    for state in judged:
+        groups.setdefault((state.window.observation, state.window.group), []).append(state)
+    return list(groups.values())
+
+
+def _believe(judged: Sequence[_Judged]) -> None:
+    for members in _groups(judged):
+        total = np.sum([state.ratios for state in members], axis=0)
+        belief = np.exp(total - log_sum_exp(total, axis=0))
+        for state in members:
+            state.belief = belief
+
+
+def _all_statistics(judged: Sequence[_Judged], motions: Sequence[Motion], noise: NoiseModel) -> list[Statistics]:
+    residuals = _residuals(judged, motions)
+    found = []
+    for state in judged:
+        window = state.window
+        own = residuals[window.observation].copy()
+        own[:, window.first : window.last] += state.signal
+        found.append(statistics(window, window.tones[state.kept], state.rows, noise, own))
+    return found
+
+
+@dataclass(frozen=True)
+class _Hypothesis:
+    """A plant posterior for one window: weight of the hypothesis, of each plant, and mean gains (axes, plants, A)."""
+
+    weight: float
+    plants: Floats
+    gains: Floats
+
+
+def _judge(judged: Sequence[_Judged], found: Sequence[Statistics]) -> list[list[_Hypothesis]]:
+    """Refresh every window's ratios under the plant that the others show; returns the hypotheses used."""
+    said = [
+        (
+            np.einsum("l,dlpab->dpab", state.belief, data.precision),
+            np.einsum("l,dlpa->dpa", state.belief, data.information),
+        )
+        for state, data in zip(judged, found, strict=True)
+    ]
+    totals = (sum(entry[0] for entry in said), sum(entry[1] for entry in said))
+    own_totals: dict[int, tuple[Floats, Floats]] = {}
+    for state, entry in zip(judged, said, strict=True):
+        before = own_totals.get(state.window.observation, (0.0, 0.0))
+        own_totals[state.window.observation] = (before[0] + entry[0], before[1] + entry[1])
+    results = []
+    for state, data, entry in zip(judged, found, said, strict=True):
+        sources = [own_totals[state.window.observation]]
+        if len(own_totals) > 1:
+            sources.append(totals)
+        ratios, hypotheses = [], []
+        for source in sources:
+            values, plants, gains = _under(data, source[0] - entry[0], source[1] - entry[1])
+            ratios.append(values)
+            hypotheses.append((float(log_sum_exp(values, axis=0)), plants, gains))
+        state.ratios = log_sum_exp(np.stack(ratios), axis=0) - np.log(len(ratios))
+        top = max(weight for weight, _, _ in hypotheses)
+        norm = sum(np.exp(weight - top) for weight, _, _ in hypotheses)
+        results.append([_Hypothesis(float(np.exp(w - top) / norm), p, g) for w, p, g in hypotheses])
+    return results
+
+
+def _under(data: Statistics, precision: Floats, information: Floats) -> tuple[Floats, Floats, Floats]:
+    """Ratios (L,) under a plant known by `precision` (axes, plants, A, A) and `information` (axes, plants, A)."""
+    axes = information.shape[-1]
+    known = np.eye(axes) / GAIN_VARIANCE + precision
+    alone = half_log_evidence(known, information)
+    per_plant = alone.sum(axis=0)
+    plants = np.exp(per_plant - log_sum_exp(per_plant, axis=0))
+    both = half_log_evidence(known[:, None] + data.precision, information[:, None] + data.information)
+    ratios = log_sum_exp((both - alone[:, None]).sum(axis=0) + np.log(plants + 1e-300), axis=1)
+    gains = np.linalg.solve(known, information[..., None])[..., 0]
+    return ratios, plants, gains
+
+
+def _expect_signals(judged: Sequence[_Judged], hypotheses: Sequence[list[_Hypothesis]], noise: NoiseModel) -> None:
+    for state, alternatives in zip(judged, hypotheses, strict=True):
+        tones = np.einsum("l,lak->ak", state.belief, state.window.tones[state.kept])
+        heard = np.einsum("ak,pkn->pan", tones, state.rows)
+        gains = sum(item.weight * item.plants[None, :, None] * item.gains for item in alternatives)
+        scales = noise.scales[state.window.observation]
+        state.signal = np.einsum("dpa,pan->dn", gains, heard) * scales[:, None]
+
+
+def _all_candidates(state: _Judged) -> Floats:
+    """Ratios of all M candidates: those dropped after the first pass stand below the worst that was kept."""
+    full = state.first_pass - state.first_pass[state.kept].min() + state.ratios.min()
+    full = np.minimum(full, state.ratios.min())
+    full[state.kept] = state.ratios
+    return np.asarray(full)

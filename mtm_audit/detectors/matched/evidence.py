@@ -1,0 +1,44 @@
+"""Gaussian evidence: how much better the data are explained with a waveform of unknown gain than without."""
+
+import numpy as np
+
+from mtm_audit.tracks import Floats
+
+# Prior variance of a gain, in units of the innovation's standard deviation per unit of waveform.
+GAIN_VARIANCE = 6.0
+
+
+def half_log_evidence(precision: Floats, information: Floats) -> Floats:
+    """(h' Q^-1 h - log det Q) / 2 for stacks of small systems: Q (..., A, A) symmetric positive, h (..., A).
+
+    A Cholesky factorisation written out over the few axes, so that it runs over the whole stack at once.
+    """
+    axes = information.shape[-1]
+    rows: list[list[Floats]] = []
+    solved: list[Floats] = []
+    total = np.zeros(np.broadcast_shapes(precision.shape[:-2], information.shape[:-1]))
+    for row in range(axes):
+        factors: list[Floats] = []
+        for column in range(row):
+            value = precision[..., row, column]
+            for inner in range(column):
+                value = value - factors[inner] * rows[column][inner]
+            factors.append(value / rows[column][column])
+        diagonal = precision[..., row, row]
+        residual = information[..., row]
+        for column in range(row):
+            diagonal = diagonal - factors[column] ** 2
+            residual = residual - factors[column] * solved[column]
+        root = np.sqrt(diagonal)
+        factors.append(root)
+        rows.append(factors)
+        solved.append(residual / root)
+        total += 0.5 * solved[row] ** 2 - np.log(root)
+    return total
+
+
+def log_sum_exp(values: Floats, axis: int) -> Floats:
+    """log(sum(exp(values))) along an axis, without overflow."""
+    top = np.max(values, axis=axis, keepdims=True)
+    result: Floats = np.squeeze(top, axis=axis) + np.log(np.sum(np.exp(values - top), axis=axis))
+    return result

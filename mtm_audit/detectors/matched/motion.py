@@ -1,0 +1,63 @@
+"""Observed motion on a uniform grid, with what was not seen marked as such."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from mtm_audit.glimpse import Glimpse
+from mtm_audit.tracks import Bools, Floats
+from mtm_onboard.protocol.errors import MtmError
+
+# Cells of a fifth of the highest tone's period: little of the band is averaged away, little beyond it folds back.
+_CELLS_PER_PERIOD = 5.0
+_SHORTEST_GAP_S = 0.15
+_FEWEST_CELLS = 16
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Mean velocities over equal cells: `velocities` (axes, n), `seen` (n,), first cell from `start_s` on."""
+
+    start_s: float
+    step_s: float
+    velocities: Floats
+    seen: Bools
+
+    @property
+    def middles_s(self) -> Floats:
+        """Middle instant of each cell, shape (n,)."""
+        return self.start_s + (np.arange(len(self.seen)) + 0.5) * self.step_s
+
+
+def uniform_motion(glimpse: Glimpse, highest_hz: float) -> Motion:
+    """Average a glimpse's velocities over cells that suit a band ending at `highest_hz`.
+
+    Positions are interpolated by a cubic spline through the observations, so irregular frame times and short gaps
+    cost little; cells that touch a longer gap are not seen. Raises MtmError when fewer than 16 cells come out.
+    """
+    step_s = max(float(np.median(glimpse.durations_s)), 1.0 / (_CELLS_PER_PERIOD * highest_hz))
+    steps = glimpse.velocities * glimpse.durations_s[:, None]
+    positions = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+    count = int((glimpse.edges_s[-1] - glimpse.edges_s[0]) / step_s + 1e-6)
+    if count < _FEWEST_CELLS:
+        raise MtmError(
+            f"track {glimpse.name!r} lasts {glimpse.edges_s[-1] - glimpse.edges_s[0]:.2f} s only; record at least "
+            f"{_FEWEST_CELLS * step_s:.1f} s"
+        )
+    edges_s = glimpse.edges_s[0] + np.arange(count + 1) * step_s
+    velocities = np.diff(CubicSpline(glimpse.edges_s, positions)(edges_s), axis=0).T / step_s
+    seen = _seen_cells(glimpse, edges_s)
+    velocities[:, ~seen] = 0.0
+    return Motion(float(glimpse.edges_s[0]), step_s, velocities, seen)
+
+
+def _seen_cells(glimpse: Glimpse, edges_s: Floats) -> Bools:
+    durations_s = glimpse.durations_s
+    gaps = np.flatnonzero(durations_s > max(_SHORTEST_GAP_S, 2.5 * float(np.median(durations_s))))
+    seen = np.ones(len(edges_s) - 1, dtype=np.bool_)
+    for gap in gaps:
+        first = np.searchsorted(edges_s, glimpse.edges_s[gap], side="right") - 1
+        last = np.searchsorted(edges_s, glimpse.edges_s[gap + 1], side="left")
+        seen[max(0, first) : last] = False
+    return seen

@@ -1,0 +1,130 @@
+"""Windows of a recording as linear models of the waveforms' tones, and what the data say about them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mtm_audit.detectors.matched.motion import Motion
+from mtm_audit.detectors.matched.noise import NoiseModel, whitened
+from mtm_audit.detectors.matched.plants import TAIL_S, Plants, tone_responses
+from mtm_audit.timing import Timing
+from mtm_audit.tracks import Floats
+from mtm_onboard.protocol.codebook import Codebook
+from mtm_onboard.protocol.scheme import Channel
+
+
+@dataclass(frozen=True)
+class Window:
+    """One window of one observation.
+
+    `observation` numbers the observation, `number` the window from the onset on, `group` is shared by the windows
+    that repeat the same symbol. `first` and `last` bound the cells that hear the window (its tail included);
+    `since_start_s` (n,) are their middles. `tones` (M, axes, 2 K): real and imaginary parts of the candidates' tones,
+    so that a waveform is `tones` times the rows of `Responses.rows`.
+    """
+
+    observation: int
+    number: int
+    group: int
+    first: int
+    last: int
+    since_start_s: Floats
+    length_s: float
+    tones_hz: Floats
+    tones: Floats
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What the data say about candidates of a window under each plant, in units of the noise.
+
+    `information` (observed axes, L, plants, A) and `precision` (observed axes, L, plants, A, A): a candidate whose
+    injected axes reach an observed axis with gains g has log-likelihood ratio  g . information - g' precision g / 2.
+    """
+
+    information: Floats
+    precision: Floats
+
+
+def make_window(
+    codebook: Codebook, channel: Channel, motion: Motion, timing: Timing, observation: int, number: int, group: int
+) -> Window:
+    """The window that begins `number` window lengths after the onset; it may lie partly outside the recording."""
+    ticks = codebook.scheme.window_ticks(channel)
+    length_s = ticks / timing.rate_hz
+    middles_s = motion.middles_s
+    start_s = timing.onset_s + number * length_s
+    first, last = np.searchsorted(middles_s, [start_s, start_s + length_s + TAIL_S])
+    return Window(
+        observation,
+        number,
+        group,
+        int(first),
+        int(last),
+        middles_s[first:last] - start_s,
+        length_s,
+        codebook.bins(channel) * (timing.rate_hz / ticks),
+        real_tones(codebook, channel, number),
+    )
+
+
+def real_tones(codebook: Codebook, channel: Channel, number: int) -> Floats:
+    """Real and imaginary parts of all candidates' tones, side by side: (M, axes, 2 K)."""
+    tones = codebook.tones(channel, number)
+    return np.concatenate([tones.real, tones.imag], axis=-1)
+
+
+def response_rows(window: Window, plants: Plants) -> Floats:
+    """Each plant's response to the window's tones in its cells: (plants, 2 K, n)."""
+    responses = tone_responses(plants, window.tones_hz, window.since_start_s, window.length_s)
+    return np.concatenate([responses.real, -responses.imag], axis=1)
+
+
+def statistics(window: Window, tones: Floats, rows: Floats, noise: NoiseModel, residual: Floats) -> Statistics:
+    """Correlate candidates with the data: `tones` (L, A, 2 K), `rows` (plants, 2 K, n), `residual` (axes, cells).
+
+    `residual` is the observed motion less what all other windows are believed to add.
+    """
+    order = noise.order
+    before = max(0, window.first - order)
+    silent = np.zeros((*rows.shape[:2], window.first - before))
+    heard = whitened(np.concatenate([silent, rows], axis=2), noise.filter)
+    observed = whitened(residual[:, before : window.last], noise.filter)
+    scales = noise.scales[window.observation]
+    weights = noise.weights[window.observation][:, before + order : window.last]
+    count, axes, width = tones.shape
+    flat = tones.reshape(count * axes, width)
+    # Few candidates are cheapest as waveforms, many as quadratic forms of their tones.
+    summarise = _from_waveforms if len(flat) <= width else _from_tones
+    return summarise(flat, axes, heard, weights / scales[:, None] * observed, weights)
+
+
+def _from_waveforms(flat: Floats, axes: int, heard: Floats, pulled: Floats, weights: Floats) -> Statistics:
+    """`flat` (L A, 2 K), `heard` (plants, 2 K, n) whitened, `pulled` and `weights` (observed axes, n)."""
+    waveforms = (flat @ heard).reshape(len(heard), -1, axes, heard.shape[-1])
+    information = np.einsum("plan,dn->dlpa", waveforms, pulled, optimize=True)
+    precision = np.empty((len(pulled), waveforms.shape[1], len(heard), axes, axes))
+    for one in range(axes):
+        for other in range(one, axes):
+            product = (waveforms[:, :, one] * waveforms[:, :, other]) @ weights.T
+            precision[..., one, other] = precision[..., other, one] = product.transpose(2, 1, 0)
+    return Statistics(information, precision)
+
+
+def _from_tones(flat: Floats, axes: int, heard: Floats, pulled: Floats, weights: Floats) -> Statistics:
+    """The same numbers through the tones' second moments."""
+    plants, width = heard.shape[:2]
+    count = len(flat) // axes
+    tones = flat.reshape(count, axes, width)
+    information = np.empty((len(pulled), count, plants, axes))
+    precision = np.empty((len(pulled), count, plants, axes, axes))
+    for axis in range(len(pulled)):
+        projection = heard @ pulled[axis]
+        information[axis] = (flat @ projection.T).reshape(count, axes, plants).transpose(0, 2, 1)
+        power = (heard * weights[axis]) @ heard.transpose(0, 2, 1)
+        turned = (flat @ power).reshape(plants, count, axes, width)
+        for one in range(axes):
+            for other in range(one, axes):
+                product = np.einsum("plk,lk->lp", turned[:, :, one], tones[:, other])
+                precision[axis, :, :, one, other] = precision[axis, :, :, other, one] = product
+    return Statistics(information, precision)
