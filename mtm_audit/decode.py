@@ -8,7 +8,7 @@ import numpy as np
 
 from mtm_audit.assignment import assign_tracks
 from mtm_audit.detectors import make_detector
-from mtm_audit.detectors.base import Detector, Observation, Reading
+from mtm_audit.detectors.base import ChannelReading, Observation, Reading
 from mtm_audit.glimpse import Glimpse, glimpse_of_track
 from mtm_audit.order import order_is_known
 from mtm_audit.tracks import Floats, Track
@@ -96,12 +96,12 @@ def decode_tracks(
     detector = make_detector(settings.detector)
     bodies = assign_tracks(scheme, tracks, settings.assignment)
     glimpses = {body: glimpse_of_track(track) for body, track in bodies.items() if track is not None}
-    codebooks = [key.codebook(), *decoy_codebooks(key, settings.decoys)]
     observations = [
         Observation(channel, glimpses[channel.body]) for channel in scheme.channels if channel.body in glimpses
     ]
+    decoys = decoy_codebooks(key, settings.decoys)
     report = None if progress is None else partial(progress, "reading")
-    results = detector.read(codebooks, observations, settings.onset_s, report)
+    results = detector.read(key.codebook(), decoys, observations, settings.onset_s, report)
     read = {
         observation.channel.name: result
         for observation, result in zip(observations, results, strict=True)
@@ -110,12 +110,14 @@ def decode_tracks(
     if not read:
         raise next(result for result in results if isinstance(result, MtmError))
     channels = [
-        _channel_decoding(detector, channel, glimpses.get(channel.body), read.get(channel.name), scheme)
+        _channel_decoding(channel, glimpses.get(channel.body), read.get(channel.name), scheme)
         for channel in scheme.channels
     ]
-    strengths = np.sum([[reading.strength for reading in readings] for readings in read.values()], axis=0) / len(read)
-    maxima = sum(readings[0].maxima for readings in read.values())
-    evidence = weigh(float(strengths[0]), strengths[1:], maxima)
+    evidence = weigh(
+        float(np.mean([result.reading.strength for result in read.values()])),
+        np.mean([result.decoy_strengths for result in read.values()], axis=0),
+        sum(result.reading.maxima for result in read.values()),
+    )
     posteriors, symbols = _message_symbols(scheme, channels)
     return _decoding(key, settings, tuple(channels), symbols, posteriors, evidence)
 
@@ -149,12 +151,12 @@ def _decoding(
 
 
 def _channel_decoding(
-    detector: Detector, channel: Channel, glimpse: Glimpse | None, readings: list[Reading] | None, scheme: Scheme
+    channel: Channel, glimpse: Glimpse | None, result: ChannelReading | None, scheme: Scheme
 ) -> ChannelDecoding:
-    if readings is None:
+    if result is None:
         unknown = np.full((channel.symbols, scheme.alphabet_size), 1.0 / scheme.alphabet_size)
         return ChannelDecoding(channel, glimpse, None, unknown)
-    return ChannelDecoding(channel, glimpse, readings[0], detector.posteriors(readings[0], readings[1:]))
+    return ChannelDecoding(channel, glimpse, result.reading, result.posteriors)
 
 
 def _message_symbols(scheme: Scheme, channels: Sequence[ChannelDecoding]) -> tuple[Floats, tuple[int | None, ...]]:

@@ -43,27 +43,37 @@ class Observation:
     glimpse: Glimpse
 
 
-class Detector(Protocol):
-    """Scores the channels of a recording, for several codebooks at once.
+@dataclass(frozen=True)
+class ChannelReading:
+    """A channel's reading under the key, with what a verdict needs beside it.
 
-    The codebooks (the key's own and its decoys') share one scheme. `onset_s` is when the message began, or None
-    when that is searched for too; everything that is searched is searched for each codebook anew.
+    `posteriors` (positions, M): probability of each symbol at each position, given that a message is there;
+    `decoy_strengths` (decoys,): the strength that the same search found under keys that nobody holds.
+    """
+
+    reading: Reading
+    posteriors: Floats
+    decoy_strengths: Floats
+
+
+class Detector(Protocol):
+    """Scores the channels of a recording under a key's codebook and under those of its decoys.
+
+    All codebooks share one scheme. `onset_s` is when the message began, or None when that is searched for too;
+    everything that is searched is searched for each decoy anew.
     """
 
     name: str
 
     def read(
         self,
-        codebooks: Sequence[Codebook],
+        codebook: Codebook,
+        decoys: Sequence[Codebook],
         observations: Sequence[Observation],
         onset_s: float | None,
         progress: Callable[[float], None] | None = None,
-    ) -> list[list[Reading] | MtmError]:
-        """For each observation one reading a codebook, or why it cannot be read (too short for a window)."""
-        ...
-
-    def posteriors(self, reading: Reading, decoys: Sequence[Reading]) -> Floats:
-        """Probability of each symbol at each position given that a message is there: shape (positions, M)."""
+    ) -> list[ChannelReading | MtmError]:
+        """For each observation its reading, or why it cannot be read (too short for a window)."""
         ...
 
 

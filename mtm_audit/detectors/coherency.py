@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_audit.detectors.base import Observation, Reading, combine_repeats, whole_windows
+from mtm_audit.detectors.base import ChannelReading, Observation, Reading, combine_repeats, whole_windows
 from mtm_audit.detectors.welch import Complexes, mean_coherency, segment_spectra
 from mtm_audit.glimpse import Glimpse, tick_velocities_at_rates
 from mtm_audit.timing import RATE_SCALES, Timing, find_onset, plan_onset_search
@@ -26,20 +26,24 @@ class CoherencyDetector:
 
     def read(
         self,
-        codebooks: Sequence[Codebook],
+        codebook: Codebook,
+        decoys: Sequence[Codebook],
         observations: Sequence[Observation],
         onset_s: float | None,
         progress: Callable[[float], None] | None = None,
-    ) -> list[list[Reading] | MtmError]:
+    ) -> list[ChannelReading | MtmError]:
         """Read the channels one by one; each has its own timing."""
-        results: list[list[Reading] | MtmError] = []
+        results: list[ChannelReading | MtmError] = []
         for number, observation in enumerate(observations):
             if progress is not None:
                 progress(number / len(observations))
             try:
-                results.append(self.read_channel(codebooks, observation.channel, observation.glimpse, onset_s))
+                own, *others = self.read_channel([codebook, *decoys], observation.channel, observation.glimpse, onset_s)
             except MtmError as refusal:
                 results.append(refusal)
+            else:
+                strengths = np.array([other.strength for other in others])
+                results.append(ChannelReading(own, self.posteriors(own, others), strengths))
         return results
 
     def read_channel(

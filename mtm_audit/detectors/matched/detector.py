@@ -4,13 +4,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mtm_audit.detectors.base import Observation, Reading
+from mtm_audit.detectors.base import ChannelReading, Observation, Reading
 from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recording_noise
 from mtm_audit.detectors.matched.evidence import log_sum_exp
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
-from mtm_audit.detectors.matched.noise import NoiseModel
 from mtm_audit.detectors.matched.refine import refined_timing
-from mtm_audit.detectors.matched.search import Prepared, prepare, search_timing
+from mtm_audit.detectors.matched.search import prepare, search_timings
 from mtm_audit.detectors.matched.windows import Window, make_window
 from mtm_audit.timing import Timing
 from mtm_audit.tracks import Floats
@@ -29,65 +28,66 @@ class MatchedDetector:
 
     def read(
         self,
-        codebooks: Sequence[Codebook],
+        codebook: Codebook,
+        decoys: Sequence[Codebook],
         observations: Sequence[Observation],
         onset_s: float | None,
         progress: Callable[[float], None] | None = None,
-    ) -> list[list[Reading] | MtmError]:
-        """Read all observations together; timing is searched for each codebook and observation."""
-        highest_hz = codebooks[0].scheme.band_hz[1]
+    ) -> list[ChannelReading | MtmError]:
+        """Search each observation's timing under every codebook; then read all observations together under the key.
+
+        The strength is the evidence that the search found, so decoys need no more than the search.
+        """
         motions: dict[int, Motion] = {}
-        results: list[list[Reading] | MtmError] = [[] for _ in observations]
+        refusals: dict[int, MtmError] = {}
         for number, observation in enumerate(observations):
             try:
-                motions[number] = uniform_motion(observation.glimpse, highest_hz)
+                motions[number] = uniform_motion(observation.glimpse, codebook.scheme.band_hz[1])
             except MtmError as refusal:
-                results[number] = refusal
-        if not motions:
-            return results
-        readable = [observations[number] for number in motions]
-        moved = list(motions.values())
-        noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
-        prepared = [prepare(motion, noise, number) for number, motion in enumerate(moved)]
-        for done, codebook in enumerate(codebooks):
-            if progress is not None:
-                progress(done / len(codebooks))
-            readings = self._read_one(codebook, readable, moved, prepared, noise, onset_s)
-            for number, reading in zip(motions, readings, strict=True):
-                collected = results[number]
-                if isinstance(collected, list):
-                    collected.append(reading)
-        return results
+                refusals[number] = refusal
+        readings = self._read_together(codebook, decoys, observations, motions, onset_s, progress) if motions else {}
+        return [readings[number] if number in readings else refusals[number] for number in range(len(observations))]
 
-    def posteriors(self, reading: Reading, decoys: Sequence[Reading]) -> Floats:
-        """Symbol probabilities from the log-likelihood ratios, equal odds before: (positions, M)."""
-        posteriors: Floats = np.exp(reading.scores - log_sum_exp(reading.scores, axis=1)[:, None])
-        return posteriors
-
-    def _read_one(
+    def _read_together(
         self,
         codebook: Codebook,
+        decoys: Sequence[Codebook],
         observations: Sequence[Observation],
-        motions: Sequence[Motion],
-        prepared: Sequence[Prepared],
-        noise: NoiseModel,
+        motions: dict[int, Motion],
         onset_s: float | None,
-    ) -> list[Reading]:
-        channels = [observation.channel for observation in observations]
-        timings = [
-            search_timing(codebook, channel, ready, onset_s) for channel, ready in zip(channels, prepared, strict=True)
-        ]
-        windows = _all_windows(codebook, channels, motions, timings, searched=onset_s is None)
-        found = estimate(windows, motions, noise)
-        better = refined_timing(found, windows, motions, timings)
+        progress: Callable[[float], None] | None,
+    ) -> dict[int, ChannelReading]:
+        channels = [observations[number].channel for number in motions]
+        moved = list(motions.values())
+        noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
+        searched = []
+        for row, (channel, motion) in enumerate(zip(channels, moved, strict=True)):
+            part = None if progress is None else _part_of(progress, row, len(moved))
+            searched.append(search_timings([codebook, *decoys], channel, prepare(motion, noise, row), onset_s, part))
+        timings = [found[0].timing for found in searched]
+        free = onset_s is None
+        windows = _all_windows(codebook, channels, moved, timings, searched=free)
+        found = estimate(windows, moved, noise)
+        better = refined_timing(found, windows, moved, timings)
         if better != timings:
             timings = better
-            windows = _all_windows(codebook, channels, motions, timings, searched=onset_s is None)
-            found = estimate(windows, motions, noise)
-        return [
-            _reading(codebook, channel, number, windows, found, timings[number])
-            for number, channel in enumerate(channels)
-        ]
+            windows = _all_windows(codebook, channels, moved, timings, searched=free)
+            found = estimate(windows, moved, noise)
+        readings = {}
+        for row, number in enumerate(motions):
+            strengths = np.array([other.evidence for other in searched[row]])
+            reading = _reading(codebook, channels[row], row, windows, found, timings[row], float(strengths[0]))
+            readings[number] = ChannelReading(reading, _posteriors(reading.scores), strengths[1:])
+        return readings
+
+
+def _part_of(progress: Callable[[float], None], row: int, count: int) -> Callable[[float], None]:
+    return lambda fraction: progress((row + fraction) / count)
+
+
+def _posteriors(ratios: Floats) -> Floats:
+    """Symbol probabilities from log-likelihood ratios (positions, M), equal odds before."""
+    return np.asarray(np.exp(ratios - log_sum_exp(ratios, axis=1)[:, None]))
 
 
 def _all_windows(
@@ -119,15 +119,19 @@ def _all_windows(
 
 
 def _reading(
-    codebook: Codebook, channel: Channel, number: int, windows: Sequence[Window], found: Estimate, timing: Timing
+    codebook: Codebook,
+    channel: Channel,
+    number: int,
+    windows: Sequence[Window],
+    found: Estimate,
+    timing: Timing,
+    strength: float,
 ) -> Reading:
     mine = [index for index, window in enumerate(windows) if window.observation == number]
     ratios = np.stack([found.ratios[index] for index in mine])
     numbers = np.array([windows[index].number for index in mine])
-    scores = np.zeros((channel.symbols, codebook.scheme.alphabet_size))
     positions = np.mod(numbers, channel.symbols)
+    scores = np.zeros((channel.symbols, codebook.scheme.alphabet_size))
     np.add.at(scores, positions, ratios)
-    length_s = codebook.scheme.window_ticks(channel) / timing.rate_hz
-    per_position = log_sum_exp(scores, axis=1) - np.log(scores.shape[1])
-    strength = float(np.sum(np.logaddexp(0.0, per_position) - np.log(2.0)))
-    return Reading(timing, scores, ratios, positions, timing.onset_s + numbers * length_s, strength, 1)
+    starts_s = timing.onset_s + numbers * (codebook.scheme.window_ticks(channel) / timing.rate_hz)
+    return Reading(timing, scores, ratios, positions, starts_s, strength, 1)

@@ -14,6 +14,8 @@ from mtm_audit.timing import Timing
 # A drift below this over the recording changes nothing.
 _NEGLIGIBLE_S = 0.002
 _LARGEST_S = 0.04
+_PIECE_S = 2.0
+_FEWEST_PIECES = 4
 
 
 def refined_timing(
@@ -21,7 +23,7 @@ def refined_timing(
 ) -> list[Timing]:
     """Timings with rates corrected by the slope of the windows' delays; unchanged where the drift is negligible.
 
-    Each window's delay against its expected signal is one Gauss-Newton step, weighted by its information.
+    The delays are those of pieces of the windows against their expected signals, weighted by their information.
     """
     return [
         _refined(
@@ -34,36 +36,41 @@ def refined_timing(
 def _refined(
     found: Estimate, members: Sequence[int], windows: Sequence[Window], motion: Motion, timing: Timing
 ) -> Timing:
-    if len(members) < 3:
+    pieces = np.array([piece for index in members for piece in _delays(found, index, windows[index], motion)])
+    if len(pieces) < _FEWEST_PIECES or pieces[:, 1].sum() <= 0.0:
         return timing
-    delays_s, information, middles_s = np.array([_delay(found, index, windows[index], motion) for index in members]).T
-    total = information.sum()
-    if total <= 0.0:
-        return timing
-    centre_s = (information @ middles_s) / total
+    delays_s, information, middles_s = pieces.T
+    centre_s = (information @ middles_s) / information.sum()
     spread = information @ (middles_s - centre_s) ** 2
     if spread <= 0.0:
         return timing
     slope = (information @ ((middles_s - centre_s) * delays_s)) / spread
-    span_s = float(np.ptp(middles_s))
-    if not _NEGLIGIBLE_S < abs(slope) * span_s < 2.0 * _LARGEST_S:
+    if not _NEGLIGIBLE_S < abs(slope) * float(np.ptp(middles_s)) < 2.0 * _LARGEST_S:
         return timing
     # A signal that comes ever later was played by a slower clock.
-    stretch = 1.0 + slope
-    return replace(timing, onset_s=centre_s + (timing.onset_s - centre_s) * stretch, rate_hz=timing.rate_hz / stretch)
+    stretch = float(1.0 + slope)
+    onset_s = float(centre_s + (timing.onset_s - centre_s) * stretch)
+    return replace(timing, onset_s=onset_s, rate_hz=timing.rate_hz / stretch)
 
 
-def _delay(found: Estimate, index: int, window: Window, motion: Motion) -> tuple[float, float, float]:
-    """Delay of a window's data against its expected signal in seconds, its information (1/s^2), and its middle."""
+def _delays(found: Estimate, index: int, window: Window, motion: Motion) -> list[tuple[float, float, float]]:
+    """For each piece of a window: delay of the data against the expected signal (s), its information (1/s^2), middle.
+
+    One Gauss-Newton step each.
+    """
     signal, residual, noise = found.signals[index], found.residuals[window.observation], found.noise
-    middle_s = float(motion.middles_s[window.first : window.last].mean())
     if signal.shape[1] <= noise.order + 1:
-        return 0.0, 0.0, middle_s
-    slope = -np.gradient(signal, motion.step_s, axis=1)
+        return []
     scales = noise.scales[window.observation][:, None]
     weights = noise.weights[window.observation][:, window.first + noise.order : window.last]
-    moved = whitened(slope, noise.filter) / scales
+    moved = whitened(-np.gradient(signal, motion.step_s, axis=1), noise.filter) / scales
     left = whitened(residual[:, window.first : window.last], noise.filter) / scales
-    information = float(np.sum(weights * moved**2))
-    delay_s = float(np.sum(weights * moved * left)) / information if information > 0.0 else 0.0
-    return float(np.clip(delay_s, -_LARGEST_S, _LARGEST_S)), information, middle_s
+    middles_s = motion.middles_s[window.first + noise.order : window.last]
+    pieces = []
+    for chosen in np.array_split(np.arange(moved.shape[1]), max(1, round(moved.shape[1] * motion.step_s / _PIECE_S))):
+        weighted = weights[:, chosen] * moved[:, chosen]
+        information = float(np.sum(weighted * moved[:, chosen]))
+        if information > 0.0:
+            delay_s = float(np.clip(np.sum(weighted * left[:, chosen]) / information, -_LARGEST_S, _LARGEST_S))
+            pieces.append((delay_s, information, float(middles_s[chosen].mean())))
+    return pieces
