@@ -1,0 +1,81 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import signal
+
+from mtm_audit.detectors.matched.noise import fit_noise, model_order, power_response, whitened
+
+POLES = np.array([1.0, -0.8, 0.4])
+
+
+def autoregressive(rng, count, scale=1.0):
+    return signal.lfilter([1.0], POLES, scale * rng.standard_normal(count))
+
+
+def all_seen(count):
+    return np.ones(count, dtype=bool)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 8), st.integers(1, 3))
+def test_whitening_is_a_linear_filter_less_its_first_samples(seed, order, rows):
+    rng = np.random.default_rng(seed)
+    taps, signals = np.concatenate([[1.0], rng.standard_normal(order)]), rng.standard_normal((rows, 40))
+    assert whitened(signals, taps) == pytest.approx(signal.lfilter(taps, [1.0], signals, axis=-1)[:, order:])
+
+
+@given(st.lists(st.floats(-2.0, 2.0), min_size=1, max_size=8))
+def test_the_power_response_is_that_of_the_filter(taps):
+    frequencies = np.linspace(0.0, 0.5, 9)
+    response = signal.freqz(taps, worN=2 * np.pi * frequencies)[1]
+    assert power_response(np.array(taps), frequencies) == pytest.approx(np.abs(response) ** 2, abs=1e-12)
+
+
+def test_an_autoregression_is_recovered_with_the_scale_of_each_axis():
+    rng = np.random.default_rng(1)
+    signals = [np.stack([autoregressive(rng, 4000), autoregressive(rng, 4000, scale=5.0)])]
+    model = fit_noise(signals, [all_seen(4000)], order=4)
+    assert model.filter == pytest.approx([*POLES, 0.0, 0.0], abs=0.05)
+    # A Student-t fit reads the spread of Gaussian innovations a little low.
+    assert model.scales[0] == pytest.approx([1.0, 5.0], rel=0.2)
+    assert model.order == 4
+
+
+def test_outliers_are_doubted_and_do_not_bend_the_filter():
+    rng = np.random.default_rng(2)
+    clean = autoregressive(rng, 3000)
+    struck = rng.choice(np.arange(100, 2900), 60, replace=False)
+    innovations = np.zeros(3000)
+    innovations[struck] = 40.0 * rng.choice([-1.0, 1.0], 60)
+    observed = clean + signal.lfilter([1.0], POLES, innovations)
+    model = fit_noise([observed[None]], [all_seen(3000)], order=4)
+    assert model.filter[:3] == pytest.approx(POLES, abs=0.05)
+    assert model.scales[0][0] < 1.5
+    assert np.median(model.weights[0][0, struck]) < 0.05
+    assert np.median(np.delete(model.weights[0][0, 4:], struck)) > 0.8
+
+
+@given(st.integers(0, 150), st.integers(1, 60))
+def test_samples_whose_history_touches_a_gap_weigh_nothing_and_all_others_do(first, length):
+    rng, seen = np.random.default_rng(3), all_seen(250)
+    seen[first : first + length] = False
+    observed = np.where(seen, autoregressive(rng, 250), 0.0)[None]
+    model = fit_noise([observed], [seen], order=4)
+    expected = np.array([number >= 4 and seen[number - 4 : number + 1].all() for number in range(250)])
+    assert np.array_equal(model.weights[0][0] > 0.0, expected)
+
+
+def test_a_gap_s_zeros_do_not_bend_the_filter():
+    whole, seen = autoregressive(np.random.default_rng(4), 4000), np.arange(4000) % 25 >= 5
+    gapped = fit_noise([np.where(seen, whole, 0.0)[None]], [seen], order=4)
+    assert gapped.filter == pytest.approx(fit_noise([whole[None]], [all_seen(4000)], order=4).filter, abs=0.03)
+
+
+def test_a_body_that_stands_still_has_a_model_without_faults():
+    model = fit_noise([np.zeros((2, 300))], [all_seen(300)], order=4)
+    assert np.all(np.isfinite(model.filter))
+    assert np.all(model.scales[0] > 0.0)
+
+
+def test_short_recordings_get_short_filters():
+    assert [model_order(samples) for samples in (10, 450, 650, 10_000)] == [4, 4, 6, 8]

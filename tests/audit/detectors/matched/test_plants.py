@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+
+from mtm_audit.detectors.matched.plants import COARSE, FINE, MEMORY_S, TAP_S, plant_family, tone_responses
+
+TONES_HZ = np.array([0.5, 1.7, 4.6])
+LENGTH_S = 2.0
+STEP_S = 0.0005
+
+
+def by_quadrature(delay_s, lag_s, tone_hz, instant_s):
+    """The convolution integral of a delayed first-order lag with a tone that sounds from 0 to LENGTH_S."""
+    ago_s = np.arange(delay_s, MEMORY_S, STEP_S) + STEP_S / 2.0
+    kernel = np.exp(-(ago_s - delay_s) / lag_s)
+    played_s = instant_s - ago_s
+    sounding = (played_s >= 0.0) & (played_s < LENGTH_S)
+    return np.sum(kernel * np.exp(2j * np.pi * tone_hz * played_s) * sounding) / kernel.sum()
+
+
+@pytest.mark.parametrize(
+    "instants_s",
+    [
+        pytest.param([1.0, 1.33, 1.98], id="steady state"),
+        pytest.param([0.005, 0.06, 0.13, 0.31], id="start"),
+        pytest.param([2.02, 2.1, 2.33, 2.49], id="tail"),
+    ],
+)
+@pytest.mark.parametrize("family", [COARSE, FINE], ids=["coarse", "fine"])
+def test_tones_through_plants_are_the_convolution_integral(family, instants_s):
+    heard = tone_responses(family, TONES_HZ, np.array(instants_s), LENGTH_S)
+    assert heard.shape == (len(family.taps), 3, len(instants_s))
+    for plant, (delay_s, lag_s) in enumerate(zip(family.delays_s, family.lags_s, strict=True)):
+        for tone, tone_hz in enumerate(TONES_HZ):
+            expected = [by_quadrature(delay_s, lag_s, tone_hz, instant_s) for instant_s in instants_s]
+            # Taps every hundredth of a second: the first one of a short lag holds its energy half a tap late.
+            assert np.abs(heard[plant, tone] - expected).max() < 0.02
+
+
+def test_before_the_window_and_long_after_it_nothing_sounds():
+    heard = tone_responses(FINE, TONES_HZ, np.array([-0.3, -0.01, LENGTH_S + MEMORY_S + TAP_S]), LENGTH_S)
+    assert np.abs(heard).max() < 1e-12
+
+
+def test_constant_commands_are_followed_in_full_after_the_delay_and_the_lag():
+    family = plant_family(np.array([0.1]), np.array([0.05]))
+    heard = tone_responses(family, np.array([0.0]), np.array([0.05, 0.099, 0.9]), LENGTH_S)[0, 0]
+    assert heard.real == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+
+
+def test_a_family_holds_every_pair_once():
+    family = plant_family(np.array([0.02, 0.1]), np.array([0.05, 0.1, 0.4]))
+    assert list(zip(family.delays_s, family.lags_s, strict=True)) == [
+        (0.02, 0.05), (0.02, 0.1), (0.02, 0.4), (0.1, 0.05), (0.1, 0.1), (0.1, 0.4)
+    ]  # fmt: skip
+    assert family.taps.sum(axis=1) == pytest.approx(1.0)
+    assert np.all(family.taps[3:, : round(0.1 / TAP_S)] == 0.0)
