@@ -21,6 +21,7 @@ from mtm_onboard.protocol import Key
 FAKE_SECRET = b"not a real secret, only for test"
 START_S = 1.5
 RATE_HZ = 50.0
+ON_TIME = Timing(START_S, RATE_HZ)
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def motions_of(run: FleetRun, tracks=None) -> list[Motion]:
     return [uniform_motion(glimpse_of_track(track), 5.0) for track in (run.tracks if tracks is None else tracks)]
 
 
-def windows_of(run: FleetRun, motions, count=1, timing=Timing(START_S, RATE_HZ)) -> list[Window]:
+def windows_of(run: FleetRun, motions, count=1, timing=ON_TIME) -> list[Window]:
     """The first `count` windows of every channel."""
     codebook = run.key.codebook()
     return [
