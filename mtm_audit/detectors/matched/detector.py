@@ -5,11 +5,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from mtm_audit.detectors.base import ChannelReading, Observation, Reading
+from mtm_audit.detectors.matched.correlate import prepare
 from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recording_noise
 from mtm_audit.detectors.matched.evidence import log_sum_exp
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
 from mtm_audit.detectors.matched.refine import refined_timing
-from mtm_audit.detectors.matched.search import prepare, search_timings
+from mtm_audit.detectors.matched.search import search_timings
 from mtm_audit.detectors.matched.windows import Window, make_window
 from mtm_audit.timing import Timing
 from mtm_audit.tracks import Floats

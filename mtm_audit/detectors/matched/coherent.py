@@ -1,0 +1,114 @@
+"""Evidence of timing hypotheses with one set of gains for all windows of a recording.
+
+Window by window, unknown gains cost more than a short window has to give; shared by all windows they cost once.
+The gains are found by expectation-maximisation from several rotations and mirrorings of the camera.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mtm_audit.detectors.matched.correlate import Heard, Tones, template_power
+from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE
+from mtm_audit.tracks import Bools, Floats
+
+_FIRST_ROUNDS = 2
+_LAST_ROUNDS = 3
+_KEPT = 32
+
+
+def coherent_evidence(heard: Heard, tones: Sequence[Tones], lags: Floats, inside: Bools, step_s: float) -> Floats:
+    """Log evidence of each hypothesis, (hypotheses,).
+
+    `lags` (hypotheses, windows): where each window begins, in cells of `heard` and fractions of them; `inside` which
+    of them count. `tones` holds one array (M, axes, 2 K) for each window, or a single one that serves all.
+    """
+    information, count = _information(heard, tones, lags, step_s)
+    whole = np.clip(np.rint(lags).astype(np.int64), 0, heard.seen.shape[1] - 1)
+    energy = heard.seen[:, whole].transpose(1, 2, 0)[..., None] * template_power(tones[0], heard)
+    observed, axes = energy.shape[2:]
+    visible = inside[..., None]
+    # Every pair of an observed and an injected axis has a gain: (hypotheses, windows, pairs).
+    pairs: Floats = (energy.reshape(*lags.shape, observed * axes) * visible).astype(np.float32)
+    information *= visible[..., None]
+    gains = np.repeat(_starting_gains(observed, axes)[None], len(lags), axis=0)
+    for _ in range(_FIRST_ROUNDS):
+        gains = _better_gains(information, pairs, gains, count)
+    fits = _fit(information, pairs, gains, count, visible)
+    gains = np.take_along_axis(gains, np.argmax(fits, axis=1)[:, None, None], axis=1)
+    for _ in range(_LAST_ROUNDS):
+        gains = _better_gains(information, pairs, gains, count)
+    spent = 0.5 * np.log1p(GAIN_VARIANCE * pairs.sum(axis=1)).sum(axis=1)
+    return np.asarray(_fit(information, pairs, gains, count, visible)[:, 0] - spent)
+
+
+def _information(heard: Heard, tones: Sequence[Tones], lags: Floats, step_s: float) -> tuple[Floats, int]:
+    """Correlations of the best candidates, (hypotheses, windows, kept, pairs of axes), and M."""
+    count, axes, width = tones[0].shape
+    observed = len(heard.projections)
+    whole = np.clip(np.rint(lags).astype(np.int64), 0, heard.seen.shape[1] - 1)
+    turn = np.exp(-2j * np.pi * heard.tones_hz[:, None, None] * (lags - whole) * step_s)
+    tone_count = width // 2
+    complex_heard = heard.projections[:, :tone_count] + 1j * heard.projections[:, tone_count:]
+    shifted = complex_heard[:, :, whole] * turn
+    parts = np.concatenate([shifted.real, shifted.imag], axis=1).astype(np.float32)
+    kept = min(count, _KEPT)
+    result: Floats = np.empty((*lags.shape, kept, observed * axes), dtype=np.float32)
+    for window in range(lags.shape[1]):
+        flat = tones[window % len(tones)].reshape(count * axes, width)
+        columns = parts[:, :, :, window].transpose(1, 2, 0).reshape(width, -1)
+        values = (flat @ columns).reshape(count, axes, len(lags), observed)
+        values = values.transpose(2, 0, 3, 1).reshape(len(lags), count, observed * axes)
+        if kept < count:
+            strongest = np.argpartition(-np.sum(values**2, axis=2), kept, axis=1)[:, :kept]
+            values = np.take_along_axis(values, strongest[:, :, None], axis=1)
+        result[:, window] = values
+    return result, count
+
+
+def _starting_gains(observed: int, axes: int) -> NDArray[np.float32]:
+    """Quarter turns of a plain camera and of a mirrored one, at the prior's magnitude: (starts, pairs of axes)."""
+    plain = np.eye(observed, axes)
+    if observed == 1:
+        return np.stack([plain, -plain]).reshape(2, -1).astype(np.float32) * np.float32(np.sqrt(GAIN_VARIANCE))
+    starts = []
+    for mirror in (1.0, -1.0) if axes > 1 else (1.0,):
+        for cosine, sine in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)):
+            turned = plain.copy()
+            turned[1] *= mirror
+            turned[:2] = np.array([[cosine, -sine], [sine, cosine]]) @ turned[:2]
+            starts.append(turned.ravel())
+    return np.stack(starts).astype(np.float32) * np.float32(np.sqrt(GAIN_VARIANCE))
+
+
+def _ratios(information: Floats, energy: Floats, gains: Floats) -> Floats:
+    """Log-likelihood ratios (hypotheses, windows, kept, starts); `gains` (hypotheses, starts, pairs)."""
+    hypotheses, windows, kept, pairs = information.shape
+    turned = gains.transpose(0, 2, 1)
+    linear = (information.reshape(hypotheses, windows * kept, pairs) @ turned).reshape(hypotheses, windows, kept, -1)
+    return np.asarray(linear - 0.5 * (energy @ turned**2)[:, :, None])
+
+
+def _log_mixture(ratios: Floats, count: int) -> Floats:
+    """Log of silence plus the mean over all M candidates, (hypotheses, windows, starts); others than the kept add 0."""
+    top = np.maximum(ratios.max(axis=2), 0.0)
+    return np.asarray(np.log(np.exp(-top) + np.exp(ratios - top[:, :, None]).sum(axis=2) / count) + top)
+
+
+def _fit(information: Floats, energy: Floats, gains: Floats, count: int, visible: Bools) -> Floats:
+    """Log-likelihood of the windows seen plus log prior of the gains, (hypotheses, starts)."""
+    carried = _log_mixture(_ratios(information, energy, gains), count) - np.log(2.0)
+    fit = np.where(visible, carried, 0.0).sum(axis=1) - 0.5 * np.sum(gains**2, axis=2) / GAIN_VARIANCE
+    return np.asarray(fit)
+
+
+def _better_gains(information: Floats, energy: Floats, gains: Floats, count: int) -> Floats:
+    """One step of expectation-maximisation."""
+    ratios = _ratios(information, energy, gains)
+    belief = np.exp(ratios - _log_mixture(ratios, count)[:, :, None]) / count
+    hypotheses, windows, kept, starts = belief.shape
+    turned = belief.reshape(hypotheses, windows * kept, starts).transpose(0, 2, 1)
+    pulled = turned @ information.reshape(hypotheses, windows * kept, -1)
+    weight = belief.sum(axis=2).transpose(0, 2, 1) @ energy + 1.0 / GAIN_VARIANCE
+    return np.asarray(pulled / weight)

@@ -1,0 +1,121 @@
+"""The whitened motion correlated with every tone at every instant: what all candidates of all codebooks share."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, log_sum_exp
+from mtm_audit.detectors.matched.motion import Motion
+from mtm_audit.detectors.matched.noise import NoiseModel, power_response, whitened
+from mtm_audit.detectors.matched.plants import MEMORY_S, TAIL_S, plant_family, tone_responses
+from mtm_audit.tracks import Floats
+from mtm_onboard.protocol.codebook import Codebook
+from mtm_onboard.protocol.scheme import Channel
+
+Tones = NDArray[np.float32]
+
+_TYPICAL = plant_family(np.array([0.07]), np.array([0.14]))
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A motion made ready for correlation.
+
+    `filtered` (observed axes, n): whitened, weighted and whitened backwards, in units of the noise; `weights`
+    (observed axes, n) as in the noise model, whose filter is `noise_filter`.
+    """
+
+    motion: Motion
+    filtered: Floats
+    weights: Floats
+    noise_filter: Floats
+
+
+def prepare(motion: Motion, noise: NoiseModel, observation: int) -> Prepared:
+    """Whiten, weight, and whiten backwards (the adjoint), so that correlating with a plain template is matched."""
+    weights, scales = noise.weights[observation], noise.scales[observation]
+    order = noise.order
+    errors = whitened(motion.velocities, noise.filter) * weights[:, order:] / scales[:, None]
+    silent = np.zeros((len(errors), order))
+    filtered = whitened(np.concatenate([silent, errors[:, ::-1], silent], axis=1), noise.filter)[:, ::-1]
+    return Prepared(motion, filtered, weights, noise.filter)
+
+
+@dataclass(frozen=True)
+class Heard:
+    """The motion correlated with each tone at each lag, at one rate; the same for every codebook.
+
+    `projections` (observed axes, 2 K, lags): real and imaginary parts; `tones_hz` (K,); `steady` (2 K,) power of each
+    tone's whitened response in a cell; `seen` (observed axes, lags) weight of the cells that a window starting there
+    would have. Lag 0 is `lead` cells before the recording.
+    """
+
+    projections: NDArray[np.float32]
+    tones_hz: Floats
+    steady: Floats
+    seen: Floats
+
+
+def hear(prepared: Prepared, codebook: Codebook, channel: Channel, rate_hz: float, lead: int) -> Heard:
+    """Correlate at one candidate rate; of the codebook only its scheme matters."""
+    motion, ticks = prepared.motion, codebook.scheme.window_ticks(channel)
+    length_s = ticks / rate_hz
+    tones_hz = codebook.bins(channel) * (rate_hz / ticks)
+    cells = int(np.ceil((length_s + TAIL_S) / motion.step_s))
+    response = tone_responses(_TYPICAL, tones_hz, (np.arange(cells) + 0.5) * motion.step_s, length_s)[0]
+    count = len(motion.seen)
+    lags = count + lead
+    size = fft.next_fast_len(count + lead + cells)
+    shifted = np.zeros((len(prepared.filtered), size))
+    shifted[:, lead : lead + count] = prepared.filtered
+    # Correlation: the sum over cells of shifted[lag + cell] times response[cell].
+    kernel = fft.fft(response[:, ::-1], size, axis=-1)
+    crossed = fft.fft(shifted, axis=-1)[:, None] * kernel[None]
+    heard = fft.ifft(crossed, axis=-1)[..., cells - 1 : cells - 1 + lags]
+    projections = np.concatenate([heard.real, heard.imag], axis=1).astype(np.float32)
+    weights = np.zeros((len(prepared.weights), size))
+    weights[:, lead : lead + count] = prepared.weights
+    settled = tone_responses(_TYPICAL, tones_hz, np.array([MEMORY_S]), 2.0 * MEMORY_S)[0, :, 0]
+    steady = np.abs(settled) ** 2 * power_response(prepared.noise_filter, tones_hz * motion.step_s)
+    seen = np.maximum(_moving_sum(weights, cells)[:, :lags], 0.0)
+    return Heard(projections, tones_hz, np.concatenate([steady, steady]), seen)
+
+
+def _moving_sum(values: Floats, cells: int) -> Floats:
+    """Sum of `cells` values from each place on, shape as the input."""
+    summed = np.cumsum(
+        np.concatenate([np.zeros((len(values), 1)), values, np.zeros((len(values), cells))], axis=1), axis=1
+    )
+    difference: Floats = summed[:, cells : cells + values.shape[1]] - summed[:, : values.shape[1]]
+    return difference
+
+
+def stacked_tones(codebook: Codebook, channel: Channel, number: int) -> Tones:
+    """All candidates' tones in the layout of `Heard.projections`: (M, axes, 2 K)."""
+    tones = codebook.tones(channel, number)
+    return np.concatenate([tones.real, -tones.imag], axis=-1).astype(np.float32)
+
+
+def template_power(tones: Tones, heard: Heard) -> Floats:
+    """Mean power of a candidate's whitened template in a fully seen cell, for each axis; candidates differ little."""
+    power: Floats = ((tones**2).mean(axis=0) @ heard.steady) / 2.0
+    return power
+
+
+def evidence_by_lag(tones: Tones, heard: Heard) -> Floats:
+    """Log of the mean over candidates of the evidence with gains unknown: `tones` (M, axes, 2 K) to (lags,)."""
+    count = len(tones)
+    total = np.zeros((count, heard.projections.shape[-1]), dtype=np.float32)
+    penalty = np.zeros(total.shape[1])
+    for axis, power in enumerate(template_power(tones, heard)):
+        for projection, seen in zip(heard.projections, heard.seen, strict=True):
+            energy = power * seen
+            correlation = tones[:, axis] @ projection
+            correlation *= correlation
+            correlation *= (0.5 * GAIN_VARIANCE / (1.0 + GAIN_VARIANCE * energy)).astype(np.float32)
+            total += correlation
+            penalty += 0.5 * np.log1p(GAIN_VARIANCE * energy)
+    evidence: Floats = log_sum_exp(total, axis=0) - np.log(count) - penalty
+    return evidence

@@ -1,0 +1,85 @@
+"""Where the windows of a message may lie: onsets and fine rates near one coarse rate."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mtm_audit.detectors.matched.motion import Motion
+from mtm_audit.tracks import Bools, Floats
+
+_DRIFT_S = 0.02
+# Clocks that are off by more than this are possible but rare: the scale of a Cauchy prior over relative rates.
+_USUAL_RATE_ERROR = 0.003
+
+
+@dataclass(frozen=True)
+class Grid:
+    """All hypotheses near one coarse rate.
+
+    `rates_hz` (fine rates,), `starts` (starts,) lags of window 0, `lags` (fine rates, starts, windows) where each
+    window begins, in cells; `inside` which of them can be seen; `rows` (windows,) whose evidence each window takes;
+    `prior` (fine rates,) log prior.
+    """
+
+    rates_hz: Floats
+    starts: Floats
+    lags: Floats
+    inside: Bools
+    rows: NDArray[np.int64]
+    prior: Floats
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One place of a grid, by fine rate and start, and its log evidence."""
+
+    rate: int
+    start: int
+    evidence: float
+
+
+def make_grid(
+    motion: Motion,
+    nominal_hz: float,
+    rate_hz: float,
+    spacing: float,
+    ticks: int,
+    lead: int,
+    numbered: int,
+    onset_s: float | None,
+) -> Grid:
+    """Hypotheses around `rate_hz`, whose coarse neighbours are `spacing` (relative) away.
+
+    Fine rates lie so close that windows drift by less than half a cell between them over the recording. `numbered`
+    is how many windows have waveforms of their own (1 under the fixed schedule); `lead` cells precede the recording.
+    """
+    count = len(motion.seen)
+    available = count + lead
+    fine = max(1, int(np.ceil(spacing * count * motion.step_s / (2.0 * _DRIFT_S))))
+    rates_hz = rate_hz * (1.0 + np.arange(-fine, fine + 1) / (2 * fine + 1) * spacing)
+    lengths = ticks / rates_hz / motion.step_s
+    rolling = numbered > 1
+    if onset_s is not None:
+        starts = np.array([(onset_s - motion.start_s) / motion.step_s + lead])
+    else:
+        starts = np.arange(available if rolling else int(np.ceil(lengths.max())), dtype=np.float64)
+    numbers = np.arange(numbered if rolling else int(np.ceil(available / lengths.min())) + 1)
+    lags = starts[None, :, None] + numbers * lengths[:, None, None]
+    inside = (lags >= 0) & (lags <= available - 1)
+    prior = -np.log1p(((rates_hz / nominal_hz - 1.0) / _USUAL_RATE_ERROR) ** 2)
+    return Grid(rates_hz, starts, lags, inside, numbers if rolling else np.zeros_like(numbers), prior)
+
+
+def fold(evidence: Floats, grid: Grid, most: int) -> list[Hypothesis]:
+    """Add up the windows' evidence (numbered windows, lags) and return the best hypotheses, one a local maximum."""
+    # A window either carries the message or is silent, even odds: a recording may hold more than the message.
+    carried = np.logaddexp(0.0, evidence) - np.log(2.0)
+    places = np.clip(np.rint(grid.lags).astype(np.int64), 0, evidence.shape[1] - 1)
+    totals = np.where(grid.inside, carried[grid.rows, places], 0.0).sum(axis=2) + grid.prior[:, None]
+    rates = np.argmax(totals, axis=0)
+    ridge = totals[rates, np.arange(totals.shape[1])]
+    padded = np.concatenate([[-np.inf], ridge, [-np.inf]])
+    peaks = np.flatnonzero((ridge >= padded[:-2]) & (ridge >= padded[2:]))
+    chosen = peaks[np.argsort(-ridge[peaks])[:most]]
+    return [Hypothesis(int(rates[start]), int(start), float(ridge[start])) for start in chosen]
