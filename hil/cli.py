@@ -93,6 +93,22 @@ def calibrate(
         run(rollouts, out, cells, console)
 
 
+@app.command()
+def bench(
+    rollouts: Annotated[int, typer.Option(min=1, help="Rollouts of the main lines; the slow ones take a part.")] = 200,
+    quick: Annotated[bool, typer.Option("--quick", help="A few rollouts of a few lines, for a first look.")] = False,
+    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="A picture to draw: accuracy over the window length.")] = None,
+    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/bench.jsonl"),
+) -> None:
+    """Compare the detectors, the paper's and ours, with the limit, on the same recordings."""
+    with _reported() as console:
+        from hil.commands.bench import BenchOptions
+        from hil.commands.bench import bench as run
+
+        run(BenchOptions(rollouts, quick, out, plot, cells), console)
+
+
 paper = typer.Typer(help="The paper's tables, measured on the simulated robots.", no_args_is_help=True)
 app.add_typer(paper, name="paper")
 
