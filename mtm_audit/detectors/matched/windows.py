@@ -1,5 +1,6 @@
 """Windows of a recording as linear models of the waveforms' tones, and what the data say about them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,10 +47,35 @@ class Statistics:
     precision: Floats
 
 
+def make_windows(
+    codebook: Codebook, channel: Channel, motion: Motion, timing: Timing, observation: int, numbers: Sequence[int]
+) -> list[Window]:
+    """Windows of one channel, in groups by the message position that they carry.
+
+    Under the fixed schedule they share one array of tones, so that the waveforms are derived and held once.
+    """
+    windows: list[Window] = []
+    for number in numbers:
+        shared = windows[0].tones if windows and codebook.scheme.schedule == "fixed" else None
+        group = number % channel.symbols
+        windows.append(make_window(codebook, channel, motion, timing, observation, number, group, shared))
+    return windows
+
+
 def make_window(
-    codebook: Codebook, channel: Channel, motion: Motion, timing: Timing, observation: int, number: int, group: int
+    codebook: Codebook,
+    channel: Channel,
+    motion: Motion,
+    timing: Timing,
+    observation: int,
+    number: int,
+    group: int,
+    tones: Floats | None = None,
 ) -> Window:
-    """The window that begins `number` window lengths after the onset; it may lie partly outside the recording."""
+    """The window that begins `number` window lengths after the onset; it may lie partly outside the recording.
+
+    `tones` are its `real_tones` where they are at hand.
+    """
     ticks = codebook.scheme.window_ticks(channel)
     length_s = ticks / timing.rate_hz
     middles_s = motion.middles_s
@@ -64,7 +90,7 @@ def make_window(
         middles_s[first:last] - start_s,
         length_s,
         codebook.bins(channel) * (timing.rate_hz / ticks),
-        real_tones(codebook, channel, number),
+        real_tones(codebook, channel, number) if tones is None else tones,
     )
 
 

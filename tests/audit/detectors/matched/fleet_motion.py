@@ -12,7 +12,7 @@ from hil.sensors.motion_capture import MotionCapture
 from hil.worlds.robomaster import fleet_scheme
 from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recording_noise
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
-from mtm_audit.detectors.matched.windows import Window, make_window
+from mtm_audit.detectors.matched.windows import Window, make_windows
 from mtm_audit.glimpse import glimpse_of_track
 from mtm_audit.timing import Timing
 from mtm_audit.tracks import Track
@@ -53,9 +53,9 @@ def windows_of(run: FleetRun, motions, count=1, timing=ON_TIME) -> list[Window]:
     """The first `count` windows of every channel."""
     codebook = run.key.codebook()
     return [
-        make_window(codebook, channel, motion, timing, number, window, window % channel.symbols)
+        window
         for number, (channel, motion) in enumerate(zip(run.key.scheme.channels, motions, strict=True))
-        for window in range(count)
+        for window in make_windows(codebook, channel, motion, timing, number, range(count))
     ]
 
 

@@ -10,6 +10,7 @@ from mtm_audit.detectors.matched.windows import (
     _from_tones,
     _from_waveforms,
     make_window,
+    make_windows,
     response_rows,
     statistics,
 )
@@ -113,3 +114,17 @@ def test_a_fast_clock_s_window_is_short_and_its_tones_are_high():
     plain = window_of(motion_of(200))
     assert window.length_s == pytest.approx(2.0 / 1.1)
     assert window.tones_hz == pytest.approx(1.1 * plain.tones_hz)
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+def test_windows_made_together_are_those_made_one_by_one(schedule):
+    key = key_of(scheme_of(symbols=(2,), ticks=200, schedule=schedule))
+    motion, timing, codebook = motion_of(200), Timing(10.6, 50.0), key.codebook()
+    channel = key.scheme.channels[0]
+    together = make_windows(codebook, channel, motion, timing, 3, range(-1, 3) if schedule == "fixed" else range(3))
+    assert [window.group for window in together] == [window.number % 2 for window in together]
+    for window in together:
+        alone = make_window(codebook, channel, motion, timing, 3, window.number, window.group)
+        assert (window.observation, window.first, window.last) == (3, alone.first, alone.last)
+        assert np.array_equal(window.tones, alone.tones)
+    assert (together[0].tones is together[1].tones) == (schedule == "fixed")
