@@ -109,6 +109,19 @@ def bench(
         run(BenchOptions(rollouts, quick, out, plot, cells), console)
 
 
+@app.command()
+def shim(
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts, each run with Python and with the shim.")] = 100,
+    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
+    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/shim.jsonl"),
+) -> None:
+    """Play the message with the microcontroller's C code, in the loop, and compare with Python."""
+    with _reported() as console:
+        from hil.commands.shim import shim as run
+
+        run(rollouts, out, cells, console)
+
+
 paper = typer.Typer(help="The paper's tables, measured on the simulated robots.", no_args_is_help=True)
 app.add_typer(paper, name="paper")
 

@@ -51,16 +51,16 @@ class Row:
 
 def conditions(rollouts: int) -> list[Condition]:
     """All of them, the most telling first; the slow ones with a part of the rollouts."""
-    half, fifth = -(-rollouts // 2), -(-rollouts // 5)
+    quarter, tenth = -(-rollouts // 4), -(-rollouts // 10)
     over_ticks = [Condition(replace(_PAPER, window_ticks=ticks), rollouts, rollouts) for ticks in _TICKS]
     return [
         *over_ticks[:3],
-        Condition(_SUSTAINED, rollouts, fifth),
+        Condition(_SUSTAINED, rollouts, tenth),
         *over_ticks[3:],
         *(Condition(replace(_PAPER, sigma=sigma), rollouts, rollouts) for sigma in _PAPER_SIGMAS),
-        Condition(Job(16, 50, 8, PAPER_SIGMA), rollouts, fifth),
-        *(Condition(replace(_SUSTAINED, sigma=sigma), fifth, 0) for sigma in _SUSTAINED_SIGMAS),
-        Condition(Job(1024, 100, 8, PAPER_SIGMA), half, -(-rollouts // 10)),
+        Condition(Job(16, 50, 8, PAPER_SIGMA), rollouts, tenth),
+        *(Condition(replace(_SUSTAINED, sigma=sigma), tenth, 0) for sigma in _SUSTAINED_SIGMAS),
+        Condition(Job(1024, 100, 8, PAPER_SIGMA), quarter, tenth),
     ]
 
 

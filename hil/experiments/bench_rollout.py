@@ -38,7 +38,7 @@ def rollout_parameters(job: Job, plant: MecanumParameters, silences: int, *, coh
 def read_rollout(parameters: Values, seed: int) -> dict[str, Scalar]:
     """Record one rollout and read it: how many of its symbols each detector has right, by the detector's name."""
     job = job_of(parameters)
-    plant = MecanumParameters(**{field.name: float(parameters[field.name]) for field in fields(MecanumParameters)})
+    plant = plant_of(parameters)
     recording = record(job, plant, seed)
     interference = learned_interference(job.end_s, plant, int(parameters["silences"]))
     decided = {MATCHED: read_matched(job, recording), GENIE: read_genie(job, plant, recording, interference)}
@@ -53,6 +53,11 @@ def job_of(parameters: Values) -> Job:
         int(parameters["alphabet_size"]), int(parameters["window_ticks"]), int(parameters["windows"]),
         float(parameters["sigma"]),
     )  # fmt: skip
+
+
+def plant_of(parameters: Values) -> MecanumParameters:
+    """The plant that a cell's parameters describe."""
+    return MecanumParameters(**{field.name: float(parameters[field.name]) for field in fields(MecanumParameters)})
 
 
 def read_coherency(job: Job, recording: Recording) -> Integers:

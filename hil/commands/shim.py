@@ -1,0 +1,32 @@
+"""`mtm-hil shim`: the C shim in the loop, beside the Python modulator."""
+
+from pathlib import Path
+
+from rich.console import Console
+
+from hil.experiments.cells import CellStore
+from hil.experiments.paper_robomaster import Proportion
+from hil.experiments.shim import JOB, compare, write_csv
+from hil.robots.mecanum import calibrated_parameters
+from hil.robots.shim_library import load_shim
+
+
+def shim(rollouts: int, out: Path | None, cells: Path, console: Console) -> None:
+    """Run, print and, where asked, write the comparison."""
+    load_shim()  # Where no compiler is, better to hear it before the work.
+    plant = calibrated_parameters()
+    with CellStore(cells) as store:
+        found = compare(rollouts, plant, store, console)
+    apart = f"in the two runs of a rollout robots stay within {1000.0 * found.apart_m:.2g} mm of each other"
+    print(f"messages of four symbols, T = {JOB.window_ticks}, read by the matched detector")
+    print(f"played by Python:       {_share(found.python)}")
+    print(f"played by the C shim:   {_share(found.shim)}")
+    print(f"same symbols from both: {_share(found.same)}; {apart}")
+    if out is not None:
+        write_csv(out, found, (f"mtm-hil shim -n {rollouts} --out {out}", f"{plant}", apart))
+        print(f"wrote {out}")
+
+
+def _share(share: Proportion) -> str:
+    low, high = share.interval_percent
+    return f"{share.successes} of {share.trials}, {share.percent:.1f} % [{low:.1f}-{high:.1f}]"
