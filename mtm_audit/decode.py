@@ -20,6 +20,8 @@ from mtm_onboard.protocol.scheme import Channel, Scheme
 
 # A symbol is certain when its posterior probability is at least this.
 CERTAIN = 0.95
+# The onset search takes about a kilobyte a tick; at 50 Hz this is 2.8 h.
+_MOST_TICKS = 500_000
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class DecodeSettings:
 
     detector: str = "coherency"
     onset_s: float | None = None
-    decoys: int = 40
+    decoys: int = 20
     threshold: float = 1e-4
     assignment: Mapping[str, str] = field(default_factory=dict)
 
@@ -95,7 +97,7 @@ def decode_tracks(
     scheme = key.scheme
     detector = make_detector(settings.detector)
     bodies = assign_tracks(scheme, tracks, settings.assignment)
-    glimpses = {body: glimpse_of_track(track) for body, track in bodies.items() if track is not None}
+    glimpses = {body: _glimpse(track, scheme.rate_hz) for body, track in bodies.items() if track is not None}
     observations = [
         Observation(channel, glimpses[channel.body]) for channel in scheme.channels if channel.body in glimpses
     ]
@@ -120,6 +122,17 @@ def decode_tracks(
     )
     posteriors, symbols = _message_symbols(scheme, channels)
     return _decoding(key, settings, tuple(channels), symbols, posteriors, evidence)
+
+
+def _glimpse(track: Track, rate_hz: float) -> Glimpse:
+    glimpse = glimpse_of_track(track)
+    lasts_s, most_s = float(glimpse.edges_s[-1] - glimpse.edges_s[0]), _MOST_TICKS / rate_hz
+    if not lasts_s <= most_s:
+        raise MtmError(
+            f"the recording of {track.name!r} lasts {lasts_s:g} s, and no more than {most_s:g} s can be searched; "
+            "cut out the part with the message, and check that the times are seconds"
+        )
+    return glimpse
 
 
 def _decoding(

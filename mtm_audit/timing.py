@@ -26,8 +26,8 @@ class PhatPlan:
     """What the onset search needs of a glimpse, whatever the candidate waveforms are.
 
     `phases` (rates, axes, frequencies): unit-magnitude spectra of the tick velocities at each candidate rate, zero
-    outside the band; `ticks` (rates,) the recording's length in control periods; `transform_ticks` the length of
-    the transforms. Single precision: only the place of a peak is read from them.
+    outside the band; `ticks` (rates,) the recording's length in control periods, at least one; `transform_ticks` the
+    length of the transforms. Single precision: only the place of a peak is read from them.
     """
 
     first_s: float
@@ -43,7 +43,7 @@ def plan_onset_search(glimpse: Glimpse, rates_hz: Floats, band_of_rate: Floats, 
     `band_of_rate` is (low, high) as fractions of the rate.
     """
     first_s, last_s = float(glimpse.edges_s[0]), float(glimpse.edges_s[-1])
-    ticks = np.floor((last_s - first_s) * rates_hz + 1e-6).astype(np.int64)
+    ticks = np.maximum(1, np.floor((last_s - first_s) * rates_hz + 1e-6).astype(np.int64))
     transform_ticks = fft.next_fast_len(int(ticks.max()) + window_ticks, real=True)
     frequencies = np.fft.rfftfreq(transform_ticks)
     inside = (frequencies >= band_of_rate[0]) & (frequencies <= band_of_rate[1])
@@ -88,6 +88,6 @@ def _best_candidate(plan: PhatPlan, reference: Floats) -> NDArray[np.float32]:
 def _unit(spectrum: NDArray[np.complex128]) -> NDArray[np.complex128]:
     magnitude = np.abs(spectrum)
     # What is silent next to the loudest is numerical dust; it keeps no phase.
-    floor = 1e-9 * max(float(magnitude.max()), 1e-300)
+    floor = max(1e-9 * float(magnitude.max()), 1e-300)
     unit: NDArray[np.complex128] = spectrum / np.maximum(magnitude, floor)
     return unit

@@ -15,6 +15,8 @@ VerdictName = Literal["decoded", "absent", "inconclusive"]
 
 # Skewness of the Gumbel distribution, the limit of a maximum over many candidates.
 _GUMBEL_SKEW = 1.1395
+# Smaller probabilities are all the same, 37 standard deviations from the mean.
+_LEAST_TAIL = 1e-300
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,8 @@ def weigh(strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:
 
 def _normal_of_skewed(standard: float, skew: float) -> float:
     """The standard normal quantile of the same probability as `standard` under a Pearson III law of that skew."""
-    upper = stats.pearson3.sf(standard, skew)
-    if 1e-290 < upper < 1.0:
-        return float(stats.norm.isf(upper))
-    return float(np.clip(standard, -37.0, 37.0))
+    # Each tail from its own side: the other one rounds to one, and the law itself ends somewhere below its mean.
+    upper, lower = stats.pearson3.sf(standard, skew), stats.pearson3.cdf(standard, skew)
+    if upper < lower:
+        return float(stats.norm.isf(max(upper, _LEAST_TAIL)))
+    return float(stats.norm.ppf(max(lower, _LEAST_TAIL)))

@@ -52,6 +52,24 @@ def test_the_wrong_key_finds_nothing_however_long_it_searches():
     assert (decoding.verdict, decoding.message) == ("absent", None)
 
 
+@pytest.mark.parametrize("late_s", [1e5, 1e300])
+def test_a_recording_that_is_far_too_long_is_refused_before_the_search(late_s):
+    tracks = tuple(replace(track, times_s=np.append(track.times_s[:-1], late_s)) for track in pair())
+    with pytest.raises(MtmError, match="no more than 10000 s can be searched; .*seconds"):
+        decode_tracks(tracks, PAIR, DecodeSettings(decoys=8))
+
+
+def test_a_recording_shorter_than_a_tick_is_refused():
+    tracks = tuple(replace(track, times_s=track.times_s * 1e-7) for track in pair())
+    with pytest.raises(MtmError, match="no whole window"):
+        decode_tracks(tracks, PAIR, DecodeSettings(decoys=8))
+
+
+def test_a_robot_that_stands_still_says_nothing():
+    tracks = tuple(replace(track, positions=np.ones_like(track.positions)) for track in pair())
+    assert decode_tracks(tracks, PAIR, DecodeSettings(decoys=8)).verdict == "absent"
+
+
 @pytest.mark.parametrize("onset_s", [1.0, None])
 def test_robots_that_send_nothing_give_absent(onset_s):
     decoding = decode_tracks(pair((None, None)), PAIR, DecodeSettings(onset_s=onset_s, decoys=12))
