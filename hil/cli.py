@@ -109,6 +109,22 @@ def bench(
         run(BenchOptions(rollouts, quick, out, plot, cells), console)
 
 
+@app.command("false-alarms")
+def false_alarms(
+    decodes: Annotated[int, typer.Option("-n", min=4, help="Decodes with a wrong key, and as many without.")] = 3000,
+    detector: Annotated[str, typer.Option(help="Which detector decodes.")] = "matched",
+    seed: Annotated[int, typer.Option(min=0, help="The first rollout's seed.")] = 500_000,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
+    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
+    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/false-alarms.jsonl"),
+) -> None:
+    """Decode recordings that hold nothing under the key asked, and see how the p-values are spread."""
+    with _reported() as console:
+        from hil.commands.false_alarms import false_alarms as run
+
+        run(decodes, detector, seed, workers, out, cells, console)
+
+
 @app.command()
 def shim(
     rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts, each run with Python and with the shim.")] = 100,

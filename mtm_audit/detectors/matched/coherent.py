@@ -58,12 +58,13 @@ def _information(heard: Heard, tones: Sequence[Tones], lags: Floats, step_s: flo
     for window in range(lags.shape[1]):
         flat = tones[window % len(tones)].reshape(count * axes, width)
         columns = parts[:, :, :, window].transpose(1, 2, 0).reshape(width, -1)
-        values = (flat @ columns).reshape(count, axes, len(lags), observed)
-        values = values.transpose(2, 0, 3, 1).reshape(len(lags), count, observed * axes)
+        correlated = (flat @ columns).reshape(count, axes, len(lags), observed)
+        values = correlated.transpose(2, 0, 3, 1).reshape(len(lags), count, observed * axes)
         if kept < count:
             strongest = np.argpartition(-np.sum(values**2, axis=2), kept, axis=1)[:, :kept]
-            values = np.take_along_axis(values, strongest[:, :, None], axis=1)
-        result[:, window] = values
+            result[:, window] = np.take_along_axis(values, strongest[:, :, None], axis=1)
+        else:
+            result[:, window] = values
     return result, count
 
 
