@@ -10,6 +10,7 @@ from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.tracks import Floats
 
 _SEGMENT_CELLS = 64
+_FREQUENCIES = 400
 
 
 def capacity_bps(
@@ -21,13 +22,14 @@ def capacity_bps(
     detector gains where it is quieter than that comes on top.
     """
     step_s = silences[0].step_s
-    frequencies_hz, _ = welch(silences[0].velocities, 1.0 / step_s, nperseg=_SEGMENT_CELLS)
-    interference = np.mean([_spectrum(motion) for motion in silences], axis=0)
-    inside = (frequencies_hz >= band_hz[0]) & (frequencies_hz <= band_hz[1])
+    measured_hz, _ = welch(silences[0].velocities, 1.0 / step_s, nperseg=_SEGMENT_CELLS)
+    frequencies_hz = np.linspace(*band_hz, _FREQUENCIES)
+    mean = np.mean([_spectrum(motion) for motion in silences], axis=0)
+    interference = np.array([np.interp(frequencies_hz, measured_hz, axis) for axis in mean])
     # A sum of evenly spaced tones in the band, held over each tick, lagged, and averaged over each cell.
     sent = sigma**2 / (band_hz[1] - band_hz[0])
     gain = _gain(plant, rate_hz, step_s, frequencies_hz)
-    bits = np.log2(1.0 + sent * gain / interference)[:, inside].mean(axis=1)
+    bits = np.log2(1.0 + sent * gain / interference).mean(axis=1)
     return float(bits.sum() * (band_hz[1] - band_hz[0]))
 
 
