@@ -14,6 +14,7 @@ from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, half_log_evidenc
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import NoiseModel, fit_noise, model_order
 from mtm_audit.detectors.matched.plants import COARSE, FINE
+from mtm_audit.detectors.matched.profile import PlantProfile, log_prior
 from mtm_audit.detectors.matched.windows import Statistics, Window, response_rows, statistics
 from mtm_audit.tracks import Floats
 
@@ -44,30 +45,47 @@ def fit_recording_noise(motions: Sequence[Motion], signals: Sequence[Floats]) ->
 class Estimate:
     """`ratios`: for each window log-likelihood ratios (M,) in nats, this waveform against none; `signals`: what each
     window is expected to add to the motion, (observed axes, n); `residuals`: each observation's motion less all of
-    them; `noise`: the interference as it is known in the end.
+    them; `noise`: the interference as it is known in the end; `plants`: probabilities of the plants of `FINE`, as
+    all windows together show them when all robots share one.
     """
 
     ratios: tuple[Floats, ...]
     signals: tuple[Floats, ...]
     residuals: tuple[Floats, ...]
     noise: NoiseModel
+    plants: Floats
 
 
-def estimate(windows: Sequence[Window], motions: Sequence[Motion], noise: NoiseModel) -> Estimate:
-    """Decide all windows of all observations; `noise` is a first model, fitted to the motion itself."""
-    judged = [_first_pass(window, motions[window.observation], noise) for window in windows]
+def estimate(
+    windows: Sequence[Window], motions: Sequence[Motion], noise: NoiseModel, profile: PlantProfile | None = None
+) -> Estimate:
+    """Decide all windows of all observations; `noise` is a first model, fitted to the motion itself.
+
+    `profile` is what is known of the robots' plant beforehand; without it all plants are equally likely.
+    """
+    prior, first_prior = log_prior(profile, FINE), log_prior(profile, COARSE)
+    judged = [_first_pass(window, motions[window.observation], noise, first_prior) for window in windows]
     _keep_best(judged)
     for _ in range(_ROUNDS):
         _believe(judged)
         found = _all_statistics(judged, motions, noise)
         for _ in range(2):
-            hypotheses = _judge(judged, found)
+            hypotheses = _judge(judged, found, prior)
             _believe(judged)
         _expect_signals(judged, hypotheses, noise)
         residuals = _residuals(judged, motions)
         noise = fit_recording_noise(motions, residuals)
     ratios, signals = zip(*[(_all_candidates(state), state.signal) for state in judged], strict=True)
-    return Estimate(ratios, signals, tuple(residuals), noise)
+    return Estimate(ratios, signals, tuple(residuals), noise, _shared_plants(judged, found, prior))
+
+
+def _shared_plants(judged: Sequence[_Judged], found: Sequence[Statistics], prior: Floats) -> Floats:
+    """Probabilities (plants,) of one plant for all observations, whose gains are their own."""
+    total = prior.copy()
+    for precision, information in _totals(judged, _said(judged, found)).values():
+        axes = information.shape[-1]
+        total += half_log_evidence(np.eye(axes) / GAIN_VARIANCE + precision, information).sum(axis=0)
+    return np.asarray(np.exp(total - log_sum_exp(total, axis=0)))
 
 
 def _residuals(judged: Sequence[_Judged], motions: Sequence[Motion]) -> list[Floats]:
@@ -78,13 +96,13 @@ def _residuals(judged: Sequence[_Judged], motions: Sequence[Motion]) -> list[Flo
     return residuals
 
 
-def _first_pass(window: Window, motion: Motion, noise: NoiseModel) -> _Judged:
+def _first_pass(window: Window, motion: Motion, noise: NoiseModel, log_plants: Floats) -> _Judged:
     found = statistics(window, window.tones, response_rows(window, COARSE), noise, motion.velocities)
     axes = window.tones.shape[1]
-    prior = np.eye(axes) / GAIN_VARIANCE
-    evidence = half_log_evidence(prior + found.precision, found.information).sum(axis=0)
+    gains = np.eye(axes) / GAIN_VARIANCE
+    evidence = half_log_evidence(gains + found.precision, found.information).sum(axis=0)
     constant = found.information.shape[0] * 0.5 * axes * np.log(GAIN_VARIANCE)
-    ratios = log_sum_exp(evidence, axis=1) - constant - np.log(len(COARSE.taps))
+    ratios = log_sum_exp(evidence + log_plants, axis=1) - constant
     silent = np.zeros((len(motion.velocities), window.last - window.first))
     return _Judged(window, np.arange(len(ratios)), response_rows(window, FINE), ratios, ratios, ratios, silent)
 
@@ -133,20 +151,31 @@ class _Hypothesis:
     gains: Floats
 
 
-def _judge(judged: Sequence[_Judged], found: Sequence[Statistics]) -> list[list[_Hypothesis]]:
-    """Refresh every window's ratios under the plant that the others show; returns the hypotheses used."""
-    said = [
+def _said(judged: Sequence[_Judged], found: Sequence[Statistics]) -> list[tuple[Floats, Floats]]:
+    """What each window says about the gains under each plant: precision and information, expected over candidates."""
+    return [
         (
             np.einsum("l,dlpab->dpab", state.belief, data.precision),
             np.einsum("l,dlpa->dpa", state.belief, data.information),
         )
         for state, data in zip(judged, found, strict=True)
     ]
-    totals = (sum(entry[0] for entry in said), sum(entry[1] for entry in said))
-    own_totals: dict[int, tuple[Floats, Floats]] = {}
+
+
+def _totals(judged: Sequence[_Judged], said: Sequence[tuple[Floats, Floats]]) -> dict[int, tuple[Floats, Floats]]:
+    """The same of each observation, all its windows together."""
+    totals: dict[int, tuple[Floats, Floats]] = {}
     for state, entry in zip(judged, said, strict=True):
-        before = own_totals.get(state.window.observation, (0.0, 0.0))
-        own_totals[state.window.observation] = (before[0] + entry[0], before[1] + entry[1])
+        before = totals.get(state.window.observation, (0.0, 0.0))
+        totals[state.window.observation] = (before[0] + entry[0], before[1] + entry[1])
+    return totals
+
+
+def _judge(judged: Sequence[_Judged], found: Sequence[Statistics], prior: Floats) -> list[list[_Hypothesis]]:
+    """Refresh every window's ratios under the plant that the others show; returns the hypotheses used."""
+    said = _said(judged, found)
+    totals = (np.sum([entry[0] for entry in said], axis=0), np.sum([entry[1] for entry in said], axis=0))
+    own_totals = _totals(judged, said)
     results = []
     for state, data, entry in zip(judged, found, said, strict=True):
         sources = [own_totals[state.window.observation]]
@@ -154,7 +183,7 @@ def _judge(judged: Sequence[_Judged], found: Sequence[Statistics]) -> list[list[
             sources.append(totals)
         ratios, hypotheses = [], []
         for source in sources:
-            values, plants, gains = _under(data, source[0] - entry[0], source[1] - entry[1])
+            values, plants, gains = _under(data, source[0] - entry[0], source[1] - entry[1], prior)
             ratios.append(values)
             hypotheses.append((float(log_sum_exp(values, axis=0)), plants, gains))
         state.ratios = log_sum_exp(np.stack(ratios), axis=0) - np.log(len(ratios))
@@ -164,12 +193,14 @@ def _judge(judged: Sequence[_Judged], found: Sequence[Statistics]) -> list[list[
     return results
 
 
-def _under(data: Statistics, precision: Floats, information: Floats) -> tuple[Floats, Floats, Floats]:
-    """Ratios (L,) under a plant known by `precision` (axes, plants, A, A) and `information` (axes, plants, A)."""
+def _under(data: Statistics, precision: Floats, information: Floats, prior: Floats) -> tuple[Floats, Floats, Floats]:
+    """Ratios (L,) under a plant known by `precision` (axes, plants, A, A), `information` (axes, plants, A) and the log
+    `prior` (plants,).
+    """
     axes = information.shape[-1]
     known = np.eye(axes) / GAIN_VARIANCE + precision
     alone = half_log_evidence(known, information)
-    per_plant = alone.sum(axis=0)
+    per_plant = alone.sum(axis=0) + prior
     plants = np.exp(per_plant - log_sum_exp(per_plant, axis=0))
     both = half_log_evidence(known[:, None] + data.precision, information[:, None] + data.information)
     ratios = log_sum_exp((both - alone[:, None]).sum(axis=0) + np.log(plants + 1e-300), axis=1)

@@ -59,10 +59,10 @@ def windows_of(run: FleetRun, motions, count=1, timing=ON_TIME) -> list[Window]:
     ]
 
 
-def estimated(run: FleetRun, tracks=None, count=1) -> Estimate:
+def estimated(run: FleetRun, tracks=None, count=1, profile=None) -> Estimate:
     motions = motions_of(run, tracks)
     noise = fit_recording_noise(motions, [motion.velocities for motion in motions])
-    return estimate(windows_of(run, motions, count), motions, noise)
+    return estimate(windows_of(run, motions, count), motions, noise, profile)
 
 
 def turned(track: Track, angle_rad: float, *, mirrored: bool = False) -> Track:

@@ -1,0 +1,104 @@
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis.extra.numpy import arrays
+from hypothesis.strategies import floats
+
+from mtm_audit.detectors.matched.plants import COARSE, FINE
+from mtm_audit.detectors.matched.profile import PlantProfile, load_profile, log_prior, profile_text, save_profile
+from mtm_onboard.protocol import MtmError
+from tests.audit.detectors.matched.fleet_motion import estimated, fleet_run
+
+COUNT = len(FINE.taps)
+
+
+def certain_of(plant):
+    return PlantProfile(np.eye(COUNT)[plant])
+
+
+@given(arrays(np.float64, COUNT, elements=floats(0.01, 1.0)))
+def test_a_file_gives_back_what_was_written(tmp_path_factory, weights):
+    path = tmp_path_factory.mktemp("profile") / "robot.profile"
+    save_profile(PlantProfile(weights / weights.sum()), path)
+    assert load_profile(path).weights == pytest.approx(weights / weights.sum(), abs=1e-5)
+
+
+def test_without_a_profile_all_plants_are_equally_likely():
+    assert log_prior(None, COARSE) == pytest.approx(-np.log(len(COARSE.taps)))
+
+
+@pytest.mark.parametrize("plant", range(0, COUNT, 5))
+@pytest.mark.parametrize("family", [FINE, COARSE], ids=["fine", "coarse"])
+def test_a_profile_favours_what_is_near_and_rules_nothing_out(plant, family):
+    prior = np.exp(log_prior(certain_of(plant), family))
+    best = int(np.argmax(prior))
+    assert prior.sum() == pytest.approx(1.0)
+    assert prior[best] > 0.9
+    assert prior.min() > 1e-3
+    group_delays_s = family.delays_s + family.lags_s
+    assert abs(group_delays_s[best] - FINE.delays_s[plant] - FINE.lags_s[plant]) < 0.16
+
+
+def test_a_long_recording_shows_the_plant_and_a_wrong_profile_only_delays_it():
+    run = fleet_run(31, message_ticks=300)
+    learnt = estimated(run)
+    assert learnt.plants.sum() == pytest.approx(1.0)
+    # The simulated chassis follows after a delay and a lag of together about a fifth of a second.
+    assert learnt.plants @ (FINE.delays_s + FINE.lags_s) == pytest.approx(0.2, abs=0.06)
+    misled = estimated(run, profile=certain_of(COUNT - 1))
+    assert tuple(int(ratios.argmax()) for ratios in misled.ratios) == run.symbols
+    assert misled.plants[-1] < 0.5
+
+
+def test_a_profile_makes_short_windows_surer():
+    profile = PlantProfile(estimated(fleet_run(31, message_ticks=300)).plants)
+    gains = []
+    for seed in range(41, 51):
+        run = fleet_run(seed, message_ticks=36)
+        for known, plain, symbol in zip(
+            estimated(run, profile=profile).ratios, estimated(run).ratios, run.symbols, strict=True
+        ):
+            gains.append(log_probability(known, symbol) - log_probability(plain, symbol))
+    assert np.mean(gains) > 0.0
+
+
+def log_probability(ratios, symbol):
+    return float(ratios[symbol] - np.logaddexp.reduce(ratios))
+
+
+def faulty(edit):
+    return edit(profile_text(PlantProfile(np.full(COUNT, 1.0 / COUNT))))
+
+
+@pytest.mark.parametrize(
+    ("edit", "sentence"),
+    [
+        (lambda text: text.replace("format = 1", "format = 2"), "profile format 2, this program reads 1"),
+        (lambda text: text.replace("format = 1", ""), "profile format None"),
+        (lambda text: text + "gain = 3\n", "unknown field 'gain'"),
+        (lambda text: re.sub(r".*delay_s = 0.15, lag_s = 0.4.*\n", "", text), "does not list the 24 plants"),
+        (lambda text: "format = 1\nplants = 3\n", "does not list the 24 plants"),
+        (lambda text: text.replace("lag_s = 0.05", "lag_s = 0.07", 1), "plant 1 is none of this program's"),
+        (lambda text: text.replace("lag_s", "lagging_s", 1), "plant 1 must have delay_s, lag_s, weight"),
+        (lambda text: text.replace("weight = 0.0", "weight = -0.0", 1), "weight of plant 1 is -0.0"),
+        (lambda text: text.replace("weight = 0.0", "weight = 0.9", 1), "the weights add up to 1.9"),
+        (lambda text: text.replace("weight = 0.041667", "weight = nan", 1), "the weight of plant 1 is nan"),
+        (lambda text: text.replace("weight = 0.041667", "weight = 'much'", 1), "plant 1 holds something that is not"),
+        (lambda text: text.replace("weight = 0.041667", "weight = true", 1), "plant 1 holds something that is not"),
+        (lambda text: text[:200], "is no profile"),
+        (lambda text: "\x00", "is no profile"),
+    ],
+)
+def test_a_faulty_file_is_refused_in_one_sentence(tmp_path, edit, sentence):
+    path = tmp_path / "robot.profile"
+    path.write_text(faulty(edit), encoding="utf-8")
+    with pytest.raises(MtmError, match=re.escape(sentence)) as caught:
+        load_profile(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_there_is_refused_by_name(tmp_path):
+    with pytest.raises(MtmError, match="cannot read the profile .*robot.profile: No such file"):
+        load_profile(tmp_path / "robot.profile")
