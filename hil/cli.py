@@ -138,6 +138,21 @@ def shim(
         run(rollouts, out, cells, console)
 
 
+@app.command()
+def robustness(
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts under each condition.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="The first rollout's seed.")] = 600_000,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
+    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
+    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/robustness.jsonl"),
+) -> None:
+    """Read the same rollouts through cameras, frames and clocks that nobody calibrated."""
+    with _reported() as console:
+        from hil.commands.robustness import robustness as run
+
+        run(rollouts, seed, workers, out, cells, console)
+
+
 paper = typer.Typer(help="The paper's tables, measured on the simulated robots.", no_args_is_help=True)
 app.add_typer(paper, name="paper")
 
@@ -173,6 +188,7 @@ def _reported() -> Iterator["Console"]:
         print(f"mtm-hil: the system refused ({error}); check disk space and permissions", file=sys.stderr)
         raise typer.Exit(1) from error
     except KeyboardInterrupt as error:
+        print("mtm-hil: interrupted; no half-written result is left", file=sys.stderr)
         raise typer.Exit(130) from error
     finally:
         signal.signal(signal.SIGTERM, former)

@@ -112,6 +112,9 @@ def _reported() -> Iterator[None]:
     except MtmError as error:
         print(f"mtm-audit: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
+    except OSError as error:
+        print(f"mtm-audit: the system refused ({error}); check disk space and permissions", file=sys.stderr)
+        raise typer.Exit(1) from error
     except KeyboardInterrupt as error:
         print("mtm-audit: interrupted; nothing was written", file=sys.stderr)
         raise typer.Exit(130) from error

@@ -1,4 +1,4 @@
-"""The command line: `mtm-onboard <command>`. Exit codes: 0 done, 1 error, 2 usage."""
+"""The command line: `mtm-onboard <command>`. Exit codes: 0 done, 1 error, 2 usage, 130 interrupted."""
 
 import argparse
 import sys
@@ -29,4 +29,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MtmError as error:
         print(f"mtm-onboard: {error}", file=sys.stderr)
         return 1
+    except OSError as error:
+        print(f"mtm-onboard: the system refused ({error}); check disk space and permissions", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("mtm-onboard: interrupted; nothing was written", file=sys.stderr)
+        return 130
     return code

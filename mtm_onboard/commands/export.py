@@ -84,8 +84,10 @@ def _messages(args: argparse.Namespace, scheme: "Scheme") -> int:
         return 1 if args.messages is None else int(args.messages)
     if not (math.isfinite(args.span) and args.span > 0):
         raise MtmError(f"the span is {args.span} s; give a number above zero")
-    messages: int = math.ceil(args.span * scheme.rate_hz / scheme.message_ticks)
-    return messages
+    messages: float = args.span * scheme.rate_hz / scheme.message_ticks
+    if not math.isfinite(messages):
+        raise MtmError(f"the span is {args.span} s; give a shorter one")
+    return math.ceil(messages)
 
 
 def _symbols(text: str) -> tuple[int, ...]:

@@ -14,7 +14,7 @@ def replacing(path: Path, *, mode: int = 0o644) -> Iterator[Path]:
     """Yield a temporary path beside `path`, with its suffix; it takes the place of `path` when the block succeeds.
 
     An exception or an interrupt inside the block removes the temporary file and leaves whatever `path` held.
-    Raises MtmError when the folder does not exist or cannot be written.
+    Raises MtmError when the folder does not exist or cannot be written, or when `path` is a folder.
     """
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
@@ -27,7 +27,14 @@ def replacing(path: Path, *, mode: int = 0o644) -> Iterator[Path]:
         yield temporary
         with temporary.open("rb") as written:
             os.fsync(written.fileno())
-        os.replace(temporary, path)
+        _take_place(temporary, path)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def _take_place(temporary: Path, path: Path) -> None:
+    try:
+        os.replace(temporary, path)
+    except OSError as error:
+        raise MtmError(f"cannot write {path}: {error.strerror}; name a file, not a folder") from error

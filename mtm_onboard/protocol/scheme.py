@@ -15,6 +15,9 @@ Power = Literal["ensemble", "window"]
 Schedule = Literal["fixed", "rolling"]
 
 _MAX_ALPHABET = 65_536
+# Far above any robot's; with these no product of the two overflows, and the tones can be counted one by one.
+_MAX_RATE_HZ = 1e6
+_MAX_MESSAGE_TICKS = 1 << 22
 _MIN_TONES = 2
 
 
@@ -154,6 +157,8 @@ def _check(scheme: Scheme) -> None:
     _check_band(scheme)
     if not 2 <= scheme.alphabet_size <= _MAX_ALPHABET:
         raise MtmError(f"alphabet_size is {scheme.alphabet_size}; choose 2 to {_MAX_ALPHABET}")
+    if scheme.message_ticks > _MAX_MESSAGE_TICKS:
+        raise MtmError(f"message_ticks is {scheme.message_ticks}; choose {_MAX_MESSAGE_TICKS} at most")
     if not scheme.channels:
         raise MtmError("the scheme has no channel; add at least one")
     for label in ("name", "body"):
@@ -189,6 +194,8 @@ def _check_types(scheme: Scheme) -> None:
 
 def _check_band(scheme: Scheme) -> None:
     low, high = scheme.band_hz
+    if scheme.rate_hz > _MAX_RATE_HZ:
+        raise MtmError(f"rate_hz is {scheme.rate_hz:g}; choose {_MAX_RATE_HZ:g} at most")
     if low >= high:
         raise MtmError(f"band_hz is [{low}, {high}]; put the lower edge first")
     if high >= scheme.rate_hz / 2:

@@ -229,6 +229,30 @@ def test_a_journal_that_cannot_be_written_is_an_error(tmp_path, key, capsys):
     assert "cannot write the journal" in capsys.readouterr().err
 
 
+def test_a_folder_in_the_place_of_a_result_is_left_alone(tmp_path, key, capsys):
+    wanted = ["export", "--key", key, "--channel", "robot0", "--message", 178, "-o", tmp_path]
+    assert main(list(map(str, wanted))) == 1
+    assert "name a file" in capsys.readouterr().err
+    assert main([*map(str, wanted), "--span", "1e308"]) == 1
+    assert "shorter" in capsys.readouterr().err
+    assert not list(tmp_path.parent.glob(f".{tmp_path.name}-*"))
+
+
+@pytest.mark.parametrize(
+    ("failure", "code", "says"),
+    [(OSError(28, "No space left on device"), 1, "disk space"), (KeyboardInterrupt, 130, "")],
+)
+def test_a_full_disk_and_an_interrupt_get_one_sentence(key, capsys, monkeypatch, failure, code, says):
+    def fail(*_):
+        raise failure
+
+    monkeypatch.setattr("mtm_onboard.protocol.load_key", fail)
+    assert main(["show", "--key", str(key)]) == code
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert says in error
+
+
 def test_help_takes_neither_numpy_nor_long():
     code = "import sys; from mtm_onboard.cli import main\ntry: main(['--help'])\nfinally: print('numpy' in sys.modules)"
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

@@ -61,6 +61,8 @@ def test_an_existing_key_file_is_never_overwritten(written):
         ("message_ticks = 600", "message_ticks = 12", "shortest window that works is 20"),
         ("alphabet_size = 4", "alphabet_size = 1", "2 to 65536"),
         ("alphabet_size = 4", "alphabet_size = 4.5", "whole number"),
+        ("message_ticks = 600", "message_ticks = 1000000000000", "4194304 at most"),
+        ("rate_hz = 50.0", "rate_hz = 1e308", "1e\\+06 at most"),
         ("sigma = 0.1", "sigma = nan", "above zero"),
         ("sigma = 0.1", 'sigma = 0.1\nextra = "x"', "unknown field 'extra'"),
         ('power = "window"', 'power = "loud"', "ensemble, window"),
