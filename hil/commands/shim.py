@@ -17,7 +17,8 @@ def shim(rollouts: int, out: Path | None, cells: Path, console: Console) -> None
     plant = calibrated_parameters()
     with CellStore(cells) as store:
         found = compare(rollouts, plant, store, console)
-    apart = f"in the two runs of a rollout robots stay within {1000.0 * found.apart_m:.2g} mm of each other"
+    half, most = (f"{1000.0 * apart_m:.2g} mm" for apart_m in found.apart_m)
+    apart = f"between the two runs a robot's place differs by at most {half} in half of the rollouts, {most} in all"
     print(f"messages of four symbols, T = {JOB.window_ticks}, read by the matched detector")
     print(f"played by Python:       {_share(found.python)}")
     print(f"played by the C shim:   {_share(found.shim)}")
