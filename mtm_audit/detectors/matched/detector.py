@@ -1,6 +1,7 @@
 """The matched detector behind the common interface."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from mtm_audit.detectors.matched.correlate import prepare
 from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recording_noise
 from mtm_audit.detectors.matched.evidence import log_sum_exp
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
+from mtm_audit.detectors.matched.noise import principal_axes
 from mtm_audit.detectors.matched.refine import refined_timing
 from mtm_audit.detectors.matched.search import search_timings
 from mtm_audit.detectors.matched.windows import Window, make_window
@@ -60,6 +62,7 @@ class MatchedDetector:
     ) -> dict[int, ChannelReading]:
         channels = [observations[number].channel for number in motions]
         moved = list(motions.values())
+        moved = _along_principal_axes(moved)
         noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
         searched = []
         for row, (channel, motion) in enumerate(zip(channels, moved, strict=True)):
@@ -80,6 +83,15 @@ class MatchedDetector:
             reading = _reading(codebook, channels[row], row, windows, found, timings[row], float(strengths[0]))
             readings[number] = ChannelReading(reading, _posteriors(reading.scores), strengths[1:])
         return readings
+
+
+def _along_principal_axes(motions: Sequence[Motion]) -> list[Motion]:
+    """The motions turned into axes of uncorrelated interference, the same for all that one camera sees."""
+    if len({len(motion.velocities) for motion in motions}) > 1:
+        return list(motions)
+    signals = [motion.velocities for motion in motions]
+    rotation = principal_axes(signals, fit_recording_noise(motions, signals))
+    return [replace(motion, velocities=rotation @ motion.velocities) for motion in motions]
 
 
 def _part_of(progress: Callable[[float], None], row: int, count: int) -> Callable[[float], None]:

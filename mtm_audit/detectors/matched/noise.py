@@ -58,6 +58,21 @@ def power_response(whitening_filter: Floats, cycles_per_sample: Floats) -> Float
     return response
 
 
+def principal_axes(signals: Sequence[Floats], model: NoiseModel) -> Floats:
+    """Rotation (axes, axes) to axes in which the interference of all observations together is uncorrelated.
+
+    A camera that looks on askew mixes the task's strong turns into every observed axis; along the principal axes of
+    the whitened motion they stand by themselves again, and the other axes are quiet. What was not seen counts as 0.
+    """
+    order = model.order
+    spread = np.zeros((len(signals[0]), len(signals[0])))
+    for signal, weights in zip(signals, model.weights, strict=True):
+        errors = whitened(signal, model.filter) * (weights[:, order:] > 0.0)
+        spread += errors @ errors.T
+    rotation: Floats = np.linalg.eigh(spread)[1].T
+    return rotation
+
+
 def fit_noise(signals: Sequence[Floats], seen: Sequence[Bools], order: int) -> NoiseModel:
     """Iteratively reweighted least squares over all observations: `signals` (axes, n) each, `seen` (n,) each."""
     usable = [_usable(mask, order) for mask in seen]
