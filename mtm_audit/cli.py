@@ -62,6 +62,9 @@ def decode(
     ] = False,
     plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw the decode (.png, .pdf, .svg).")] = None,
     explain: Annotated[bool, typer.Option("--explain", help="Say stage by stage what was found.")] = False,
+    profile: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="What mtm-audit profile learnt about this type of robot.")
+    ] = None,
 ) -> None:
     """Decode the message in a recording.
 
@@ -71,10 +74,42 @@ def decode(
     with _reported():
         from mtm_audit.commands.decode import DecodeOptions, run_decode
         from mtm_audit.decode import DecodeSettings
+        from mtm_audit.detectors.matched.profile import load_profile
 
-        settings = DecodeSettings(detector, onset_s, decoys, threshold, pairs)
+        known = None if profile is None else load_profile(profile)
+        settings = DecodeSettings(detector, onset_s, decoys, threshold, pairs, known)
         code = run_decode(DecodeOptions(tuple(paths), key, tracker, settings, as_json, plot, explain))
     raise typer.Exit(code)
+
+
+@app.command("profile")
+def learn_profile(
+    paths: Annotated[
+        list[Path], typer.Argument(metavar="PATH", help="A video, motion-capture files, or a folder of those.")
+    ],
+    key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
+    out: Annotated[Path, typer.Option(metavar="FILE.profile", help="Where to write what was learnt.")],
+    onset: Annotated[
+        str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
+    ] = "auto",
+    tracker: Annotated[
+        str, typer.Option(metavar="NAME", help="How to find robots in a video: aruco, or colour:NAME,...")
+    ] = "aruco",
+    assign: Annotated[
+        list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
+    ] = None,
+) -> None:
+    """Learn how a type of robot follows commands from a recording that decodes, for shorter ones of it.
+
+    Exit codes: 0 written, 1 error, 2 usage, 130 interrupted.
+    """  # fmt: skip
+    onset_s, pairs = _onset_s(onset), _pairs(assign or [])
+    with _reported():
+        from mtm_audit.commands.profile import ProfileOptions, run_profile
+        from mtm_audit.decode import DecodeSettings
+
+        settings = DecodeSettings("matched", onset_s, assignment=pairs)
+        run_profile(ProfileOptions(tuple(paths), key, out, tracker, settings))
 
 
 def _onset_s(text: str) -> float | None:

@@ -9,6 +9,7 @@ import numpy as np
 from mtm_audit.assignment import assign_tracks
 from mtm_audit.detectors import make_detector
 from mtm_audit.detectors.base import ChannelReading, Observation, Reading
+from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_audit.glimpse import Glimpse, glimpse_of_track
 from mtm_audit.order import order_is_known
 from mtm_audit.tracks import Floats, Track
@@ -26,13 +27,17 @@ _MOST_TICKS = 500_000
 
 @dataclass(frozen=True)
 class DecodeSettings:
-    """How to decode: `onset_s` None searches for the message's start; `assignment` maps bodies to track names."""
+    """How to decode: `onset_s` None searches for the message's start; `assignment` maps bodies to track names.
+
+    `profile` is what is known of the robots' plant beforehand; the detector must take one.
+    """
 
     detector: str = "coherency"
     onset_s: float | None = None
     decoys: int = 20
     threshold: float = 1e-4
     assignment: Mapping[str, str] = field(default_factory=dict)
+    profile: PlantProfile | None = None
 
 
 @dataclass(frozen=True)
@@ -95,7 +100,7 @@ def decode_tracks(
     `progress(stage, fraction)` is called now and then. Raises MtmError when no channel can be read at all.
     """
     scheme = key.scheme
-    detector = make_detector(settings.detector)
+    detector = make_detector(settings.detector, settings.profile)
     bodies = assign_tracks(scheme, tracks, settings.assignment)
     glimpses = {body: _glimpse(track, scheme.rate_hz) for body, track in bodies.items() if track is not None}
     observations = [

@@ -57,7 +57,7 @@ def run_decode(options: DecodeOptions) -> int:
 
 def _check(options: DecodeOptions) -> None:
     """Refuse what would fail after the long work."""
-    make_detector(options.settings.detector)
+    make_detector(options.settings.detector, options.settings.profile)
     tracker(options.tracker)
     if options.plot is not None:
         from mtm_audit.plot import check_plot_path

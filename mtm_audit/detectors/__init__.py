@@ -3,16 +3,18 @@
 from mtm_audit.detectors.base import Detector
 from mtm_audit.detectors.coherency import CoherencyDetector
 from mtm_audit.detectors.matched.detector import MatchedDetector
+from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_onboard.protocol.errors import MtmError
 
-DETECTORS: dict[str, type[CoherencyDetector] | type[MatchedDetector]] = {
-    "coherency": CoherencyDetector,
-    "matched": MatchedDetector,
-}
+DETECTORS = ("coherency", "matched")
 
 
-def make_detector(name: str) -> Detector:
-    """The detector of that name; raises MtmError when there is none."""
+def make_detector(name: str, profile: PlantProfile | None = None) -> Detector:
+    """The detector of that name; raises MtmError when there is none, or none that takes a plant's profile."""
     if name not in DETECTORS:
         raise MtmError(f"there is no detector {name!r}; choose one of: {', '.join(DETECTORS)}")
-    return DETECTORS[name]()
+    if name == "matched":
+        return MatchedDetector(profile)
+    if profile is not None:
+        raise MtmError(f"the detector {name!r} takes no profile; leave --profile out or choose --detector matched")
+    return CoherencyDetector()

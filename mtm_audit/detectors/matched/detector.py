@@ -11,9 +11,10 @@ from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recordi
 from mtm_audit.detectors.matched.evidence import log_sum_exp
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
 from mtm_audit.detectors.matched.noise import principal_axes
+from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_audit.detectors.matched.refine import refined_timing
 from mtm_audit.detectors.matched.search import search_timings
-from mtm_audit.detectors.matched.windows import Window, make_window
+from mtm_audit.detectors.matched.windows import Window, make_windows
 from mtm_audit.timing import Timing
 from mtm_audit.tracks import Floats
 from mtm_onboard.protocol.codebook import Codebook
@@ -25,9 +26,15 @@ _LEAST_PART = 0.3
 
 
 class MatchedDetector:
-    """Whitened matched filtering with a plant shared by all windows; scores are log-likelihood ratios in nats."""
+    """Whitened matched filtering with a plant shared by all windows; scores are log-likelihood ratios in nats.
+
+    `profile` is what is known of the robots' plant beforehand, None when nothing is.
+    """
 
     name = "matched"
+
+    def __init__(self, profile: PlantProfile | None = None) -> None:
+        self._profile = profile
 
     def read(
         self,
@@ -71,12 +78,12 @@ class MatchedDetector:
         timings = [found[0].timing for found in searched]
         free = onset_s is None
         windows = _all_windows(codebook, channels, moved, timings, searched=free)
-        found = estimate(windows, moved, noise)
+        found = estimate(windows, moved, noise, self._profile)
         better = refined_timing(found, windows, moved, timings)
         if better != timings:
             timings = better
             windows = _all_windows(codebook, channels, moved, timings, searched=free)
-            found = estimate(windows, moved, noise)
+            found = estimate(windows, moved, noise, self._profile)
         readings = {}
         for row, number in enumerate(motions):
             strengths = np.array([other.evidence for other in searched[row]])
@@ -124,10 +131,7 @@ def _all_windows(
                 f"the recording holds less than a third of a window of {length_s:g} s of channel {channel.name!r} "
                 "after the onset; record longer"
             )
-        windows += [
-            make_window(codebook, channel, motion, timing, number, window, window % channel.symbols)
-            for window in range(first, last + 1)
-        ]
+        windows += make_windows(codebook, channel, motion, timing, number, range(first, last + 1))
     return windows
 
 

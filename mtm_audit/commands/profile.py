@@ -1,0 +1,52 @@
+"""`mtm-audit profile`: learn how a type of robot follows commands from a recording that decodes."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from mtm_audit.decode import DecodeSettings, Decoding, decode_tracks
+from mtm_audit.detectors.base import Observation
+from mtm_audit.detectors.matched.learn import learn_profile
+from mtm_audit.detectors.matched.profile import PlantProfile, save_profile
+from mtm_audit.recordings.recording import read_recording, recording_files
+from mtm_audit.tracking.registry import tracker
+from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.key import Key, load_key
+
+
+@dataclass(frozen=True)
+class ProfileOptions:
+    """What the command line asked for; `settings` decode the recording first."""
+
+    paths: tuple[Path, ...]
+    key: Path
+    out: Path
+    tracker: str
+    settings: DecodeSettings
+
+
+def run_profile(options: ProfileOptions) -> None:
+    """Decode, learn, write. Raises MtmError when the recording does not decode, since its plant is then unknown."""
+    if not options.out.parent.is_dir():
+        raise MtmError(f"there is no folder {options.out.parent} to write the profile to; make it first")
+    tracker(options.tracker)
+    key = load_key(options.key)
+    files, kind = recording_files(options.paths)
+    recording = read_recording(files, kind, options.tracker, lambda _: None)
+    decoding = decode_tracks(recording.tracks, key, options.settings)
+    if decoding.verdict != "decoded":
+        raise MtmError(
+            f"the verdict on this recording is {decoding.verdict!r}, so it does not show how the robot follows; "
+            "record a longer message, or give its start with --onset"
+        )
+    save_profile(_learn(key, decoding), options.out)
+    sys.stdout.write(f"wrote {options.out}; give it to mtm-audit decode with --profile\n")
+
+
+def _learn(key: Key, decoding: Decoding) -> PlantProfile:
+    read = [
+        (Observation(channel.channel, channel.glimpse), channel.reading)
+        for channel in decoding.channels
+        if channel.glimpse is not None and channel.reading is not None
+    ]
+    return learn_profile(key.codebook(), [observation for observation, _ in read], [reading for _, reading in read])
