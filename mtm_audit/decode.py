@@ -13,7 +13,7 @@ from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_audit.glimpse import Glimpse, glimpse_of_track
 from mtm_audit.order import order_is_known
 from mtm_audit.tracks import Floats, Track
-from mtm_audit.verdict import Evidence, VerdictName, decoy_codebooks, weigh
+from mtm_audit.verdict import Evidence, VerdictName, decoy_codebooks
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.framing import number_of_symbols
 from mtm_onboard.protocol.key import Key
@@ -34,7 +34,7 @@ class DecodeSettings:
 
     detector: str = "coherency"
     onset_s: float | None = None
-    decoys: int = 20
+    decoys: int = 40
     threshold: float = 1e-4
     assignment: Mapping[str, str] = field(default_factory=dict)
     profile: PlantProfile | None = None
@@ -120,7 +120,7 @@ def decode_tracks(
         _channel_decoding(channel, glimpses.get(channel.body), read.get(channel.name), scheme)
         for channel in scheme.channels
     ]
-    evidence = weigh(
+    evidence = detector.weigh(
         float(np.mean([result.reading.strength for result in read.values()])),
         np.mean([result.decoy_strengths for result in read.values()], axis=0),
         sum(result.reading.maxima for result in read.values()),

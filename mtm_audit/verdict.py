@@ -15,6 +15,8 @@ VerdictName = Literal["decoded", "absent", "inconclusive"]
 
 # Skewness of the Gumbel distribution, the limit of a maximum over many candidates.
 _GUMBEL_SKEW = 1.1395
+# Share of the decoys whose strengths show the tail of a log evidence.
+_TAIL_PART = 0.15
 # Smaller probabilities are all the same, 37 standard deviations from the mean.
 _LEAST_TAIL = 1e-300
 
@@ -34,6 +36,28 @@ def decoy_codebooks(key: Key, count: int) -> list[Codebook]:
         Codebook(stream(key.secret, "decoy", (number,), SECRET_BYTES), key.scheme, key.scheme.epoch)
         for number in range(count)
     ]
+
+
+def weigh_log_evidence(strength: float, decoy_strengths: Floats) -> Evidence:
+    """Compare a log evidence with its decoys', whatever the shape of its law.
+
+    Among the decoys the key's rank gives the p-value, which is exact because under the null the key is one of them.
+    Beyond their upper part the tail is taken for exponential, as that of a log evidence is (Markov's inequality
+    bounds it by exp(-strength)); with k excesses of mean m over the threshold the predictive probability of a further
+    excess x is (1 + x / (k m))^-k, so that estimating the tail from few decoys costs what it should.
+    """
+    falling = np.sort(decoy_strengths)[::-1]
+    count = len(falling)
+    excesses = max(1, int(_TAIL_PART * count))
+    threshold = falling[excesses]
+    if strength > threshold:
+        mean = max(float(np.mean(falling[:excesses] - threshold)), 1e-300)
+        beyond = (1.0 + (strength - threshold) / (excesses * mean)) ** -excesses
+        return Evidence(strength, decoy_strengths, float((excesses + 1) / (count + 1) * beyond))
+    # Between two decoys the rank is interpolated; below the last one the range of them all is taken to go on.
+    points = np.concatenate([falling, [falling[-1] - np.ptp(falling) - 1e-300]])
+    rank = float(np.interp(-strength, -points, np.arange(1, count + 2)))
+    return Evidence(strength, decoy_strengths, rank / (count + 1))
 
 
 def weigh(strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:

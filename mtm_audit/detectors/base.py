@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mtm_audit.glimpse import Glimpse
 from mtm_audit.timing import Timing
 from mtm_audit.tracks import Floats
+from mtm_audit.verdict import Evidence
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel
@@ -74,6 +75,10 @@ class Detector(Protocol):
         progress: Callable[[float], None] | None = None,
     ) -> list[ChannelReading | MtmError]:
         """For each observation its reading, or why it cannot be read (too short for a window)."""
+        ...
+
+    def weigh(self, strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:
+        """How unlikely the strength is under the null, by the law that this detector's strengths follow."""
         ...
 
 

@@ -14,6 +14,7 @@ from mtm_audit.detectors.welch import Complexes, mean_coherency, segment_spectra
 from mtm_audit.glimpse import Glimpse, tick_velocities_at_rates
 from mtm_audit.timing import RATE_SCALES, Timing, find_onset, plan_onset_search
 from mtm_audit.tracks import Floats
+from mtm_audit.verdict import Evidence, weigh
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel
@@ -80,6 +81,10 @@ class CoherencyDetector:
         weights = np.exp(logs - logs.max(axis=1, keepdims=True))
         posteriors: Floats = weights / weights.sum(axis=1, keepdims=True)
         return posteriors
+
+    def weigh(self, strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:
+        """Mean coherencies are means of maxima over many candidates and rates."""
+        return weigh(strength, decoy_strengths, maxima)
 
     def _score_group(
         self,

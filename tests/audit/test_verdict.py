@@ -4,7 +4,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy import stats
 
-from mtm_audit.verdict import decoy_codebooks, weigh
+from mtm_audit.verdict import decoy_codebooks, weigh, weigh_log_evidence
 from tests.audit.moving_robot import OTHER_SECRET, key_of, scheme_of
 
 KEY = key_of(scheme_of())
@@ -77,3 +77,21 @@ def test_no_decoy_is_the_key_s_own_codebook_or_another_key_s_decoy():
 def test_decoys_play_the_key_s_epoch():
     key = key_of(scheme_of(epoch=7))
     assert {codebook.epoch for codebook in decoy_codebooks(key, 3)} == {7}
+
+
+@pytest.mark.parametrize("law", ["exponential", "normal", "gumbel", "uniform"])
+def test_log_evidence_p_values_are_uniform_or_cautious_whatever_the_law(law):
+    generator = np.random.default_rng(11)
+    draws = getattr(generator, law)(size=(4000, 41))
+    p_values = np.array([weigh_log_evidence(row[0], row[1:]).p_value for row in draws])
+    for level in (0.5, 0.2, 0.1):
+        assert abs(np.mean(p_values <= level) - level) < 0.03
+    assert np.mean(p_values <= 0.01) < 0.016
+    assert np.mean(p_values <= 0.001) < 0.003
+
+
+@given(st.floats(-50, 50), st.floats(0.001, 20), st.integers(8, 60))
+def test_more_evidence_is_never_less_convincing(strength, more, count):
+    decoys = np.random.default_rng(5).gumbel(size=count)
+    weak, strong = (weigh_log_evidence(value, decoys).p_value for value in (strength, strength + more))
+    assert 0.0 < strong <= weak <= 1.0

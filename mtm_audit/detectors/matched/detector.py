@@ -17,6 +17,7 @@ from mtm_audit.detectors.matched.search import search_timings
 from mtm_audit.detectors.matched.windows import Window, make_windows
 from mtm_audit.timing import Timing
 from mtm_audit.tracks import Floats
+from mtm_audit.verdict import Evidence, weigh_log_evidence
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel
@@ -57,6 +58,10 @@ class MatchedDetector:
                 refusals[number] = refusal
         readings = self._read_together(codebook, decoys, observations, motions, onset_s, progress) if motions else {}
         return [readings[number] if number in readings else refusals[number] for number in range(len(observations))]
+
+    def weigh(self, strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:
+        """Strengths are log evidences."""
+        return weigh_log_evidence(strength, decoy_strengths)
 
     def _read_together(
         self,

@@ -21,8 +21,8 @@ from mtm_onboard.protocol.scheme import Channel
 
 SEARCHED_RATES = 0.2
 _PHASE_ERROR_RAD = 0.6
-_PEAKS_PER_RATE = 4
-_WEIGHED = 16
+_PEAKS_PER_RATE = 8
+_WEIGHED = 64
 _HALF_CELLS = np.arange(-3, 4) / 2.0
 
 
