@@ -1,14 +1,14 @@
 """The command line: `mtm-hil <command>`. Exit codes: 0 done, 1 error, 2 usage, 130 interrupted."""
 
-import signal
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Never
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from mtm_audit.clierrors import reported
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -173,29 +173,10 @@ def paper_robomaster(
 
 @contextmanager
 def _reported() -> Iterator["Console"]:
-    """Turn errors into one sentence and an exit code; a request to terminate unwinds like any other exception."""
     from rich.console import Console
 
-    from mtm_onboard.protocol import MtmError
-
-    former = signal.signal(signal.SIGTERM, _terminated)
-    try:
+    with reported("mtm-hil", "no half-written result is left"):
         yield Console()
-    except MtmError as error:
-        print(f"mtm-hil: {error}", file=sys.stderr)
-        raise typer.Exit(1) from error
-    except OSError as error:
-        print(f"mtm-hil: the system refused ({error}); check disk space and permissions", file=sys.stderr)
-        raise typer.Exit(1) from error
-    except KeyboardInterrupt as error:
-        print("mtm-hil: interrupted; no half-written result is left", file=sys.stderr)
-        raise typer.Exit(130) from error
-    finally:
-        signal.signal(signal.SIGTERM, former)
-
-
-def _terminated(*_: object) -> Never:
-    raise SystemExit(128 + signal.SIGTERM)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

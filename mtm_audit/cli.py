@@ -5,14 +5,13 @@ Exit codes of `decode`: 0 decoded, 3 absent, 4 inconclusive, 1 error, 2 usage, 1
 
 import math
 import os
-import signal
-import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Never
+from typing import Annotated
 
 import typer
+
+from mtm_audit.clierrors import reported
 
 app = typer.Typer(
     help="Find out what a robot said with its motion: from a recording and a key to a verdict.",
@@ -71,7 +70,7 @@ def decode(
     Exit codes: 0 decoded, 3 no message of this key, 4 inconclusive, 1 error, 2 usage, 130 interrupted.
     """  # fmt: skip
     onset_s, pairs = _onset_s(onset), _pairs(assign or [])
-    with _reported():
+    with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.decode import DecodeOptions, run_decode
         from mtm_audit.decode import DecodeSettings
         from mtm_audit.detectors.matched.profile import load_profile
@@ -104,7 +103,7 @@ def learn_profile(
     Exit codes: 0 written, 1 error, 2 usage, 130 interrupted.
     """  # fmt: skip
     onset_s, pairs = _onset_s(onset), _pairs(assign or [])
-    with _reported():
+    with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.profile import ProfileOptions, run_profile
         from mtm_audit.decode import DecodeSettings
 
@@ -134,31 +133,6 @@ def _pairs(texts: Sequence[str]) -> dict[str, str]:
             raise typer.BadParameter(f"{body!r} is given two tracks; give it one", param_hint="--assign")
         pairs[body] = track
     return pairs
-
-
-@contextmanager
-def _reported() -> Iterator[None]:
-    """Turn errors into one sentence and an exit code; a request to terminate unwinds like any other exception."""
-    from mtm_onboard.protocol.errors import MtmError
-
-    former = signal.signal(signal.SIGTERM, _terminated)
-    try:
-        yield
-    except MtmError as error:
-        print(f"mtm-audit: {error}", file=sys.stderr)
-        raise typer.Exit(1) from error
-    except OSError as error:
-        print(f"mtm-audit: the system refused ({error}); check disk space and permissions", file=sys.stderr)
-        raise typer.Exit(1) from error
-    except KeyboardInterrupt as error:
-        print("mtm-audit: interrupted; nothing was written", file=sys.stderr)
-        raise typer.Exit(130) from error
-    finally:
-        signal.signal(signal.SIGTERM, former)
-
-
-def _terminated(*_: object) -> Never:
-    raise SystemExit(128 + signal.SIGTERM)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -1,0 +1,37 @@
+"""How a command ends badly: one sentence on standard error and an exit code, never a traceback."""
+
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Never
+
+import typer
+
+
+@contextmanager
+def reported(program: str, when_interrupted: str) -> Iterator[None]:
+    """Turn errors into `program: sentence` and exit code 1, an interrupt into `when_interrupted` and 130.
+
+    A request to terminate unwinds like any other exception, so that nothing half-written stays behind.
+    """
+    from mtm_onboard.protocol.errors import MtmError
+
+    former = signal.signal(signal.SIGTERM, _terminated)
+    try:
+        yield
+    except MtmError as error:
+        print(f"{program}: {error}", file=sys.stderr)
+        raise typer.Exit(1) from error
+    except OSError as error:
+        print(f"{program}: the system refused ({error}); check disk space and permissions", file=sys.stderr)
+        raise typer.Exit(1) from error
+    except KeyboardInterrupt as error:
+        print(f"{program}: interrupted; {when_interrupted}", file=sys.stderr)
+        raise typer.Exit(130) from error
+    finally:
+        signal.signal(signal.SIGTERM, former)
+
+
+def _terminated(*_: object) -> Never:
+    raise SystemExit(128 + signal.SIGTERM)
