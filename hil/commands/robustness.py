@@ -1,13 +1,14 @@
 """`mtm-hil robustness`: the matched detector under views, frames and clocks that nobody calibrated."""
 
 import csv
+from dataclasses import asdict
 from pathlib import Path
 
 from rich.console import Console
 
 from hil.experiments.cells import Cell, CellStore
 from hil.experiments.intervals import clopper_pearson
-from hil.experiments.robustness import ALPHABET, CONDITIONS, TICKS, read_under
+from hil.experiments.robustness import CONDITIONS, JOBS, read_under
 from hil.experiments.sweep import run_sweep
 from mtm_onboard.protocol.atomicfile import replacing
 
@@ -15,21 +16,23 @@ from mtm_onboard.protocol.atomicfile import replacing
 def robustness(rollouts: int, seed: int, workers: int | None, out: Path | None, cells: Path, console: Console) -> None:
     """Measure, print and, where asked, write symbol accuracy under each condition, on the same rollouts."""
     rows: list[tuple[object, ...]] = []
-    print(f"M = {ALPHABET}, T = {TICKS} a symbol, eight symbols a robot, four robots, {rollouts} rollouts each")
     with CellStore(cells) as store:
-        for name in CONDITIONS:
-            asked = [Cell("robustness", {"condition": name}, seed + row) for row in range(rollouts)]
-            results = run_sweep(read_under, asked, store, console, workers)
-            read, right = (sum(int(result[field]) for result in results) for field in ("read", "right"))
-            low, high = clopper_pearson(right, read)
-            interval = f"{100 * low:.2f}-{100 * high:.2f}"
-            print(f"{name:40s} {100 * right / read:6.2f} % of {read} symbols, 95 % interval {interval}")
-            accuracy = [f"{value:.5f}" for value in (right / read, low, high)]
-            rows.append((name, rollouts, read, right, *accuracy))
+        for job in JOBS:
+            print(f"M = {job.alphabet_size}, T = {job.ticks}, {job.windows} symbols a robot, {rollouts} rollouts")
+            for name in CONDITIONS:
+                asked = [Cell("robustness", {"condition": name, **asdict(job)}, seed + row) for row in range(rollouts)]
+                results = run_sweep(read_under, asked, store, console, workers)
+                read, right = (sum(int(result[field]) for result in results) for field in ("read", "right"))
+                low, high = clopper_pearson(right, read)
+                interval = f"{100 * low:.2f}-{100 * high:.2f}"
+                print(f"{name:40s} {100 * right / read:6.2f} % of {read} symbols, 95 % interval {interval}")
+                accuracy = [f"{value:.5f}" for value in (right / read, low, high)]
+                rows.append((job.alphabet_size, job.ticks, job.windows, name, rollouts, read, right, *accuracy))
     if out is not None:
         with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
             file.write(f"# mtm-hil robustness -n {rollouts} --seed {seed} --out {out}\n")
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(("condition", "rollouts", "symbols", "right", "accuracy", "low", "high"))
+            job_columns = ("alphabet_size", "ticks", "windows")
+            writer.writerow((*job_columns, "condition", "rollouts", "symbols", "right", "accuracy", "low", "high"))
             writer.writerows(rows)
         print(f"wrote {out}")

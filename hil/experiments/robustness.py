@@ -1,7 +1,7 @@
 """The matched detector under views, frames and clocks that nobody calibrated.
 
-One cell is one rollout of four robots with eight symbols each, seen under one condition. Tracks are true projections of
-the robots through a camera, with the noise of a tracker; a condition changes one thing at a time.
+One cell is one rollout of four robots that repeat their symbols, seen under one condition. Tracks are true projections
+of the robots through a camera, with the noise of a tracker; a condition changes one thing at a time.
 """
 
 from dataclasses import dataclass, replace
@@ -22,10 +22,22 @@ from mtm_audit.tracks import Floats, Track
 from mtm_onboard.protocol import Channel, Key
 
 _STREAM = 4
-ALPHABET, TICKS, WINDOWS = 256, 100, 8
 _START_S = 1.5
 _TRACKER_NOISE_PX = 0.1
 _TOP_M = 0.2
+
+
+@dataclass(frozen=True)
+class Job:
+    """What each robot sends: `windows` symbols of an alphabet of `alphabet_size`, `ticks` each."""
+
+    alphabet_size: int
+    ticks: int
+    windows: int
+
+
+# The paper's two bits a robot in a quarter of its time, and four bits a second from each robot.
+JOBS = (Job(4, 150, 1), Job(256, 100, 8))
 
 
 @dataclass(frozen=True)
@@ -63,14 +75,16 @@ def read_under(parameters: Values, seed: int) -> dict[str, Scalar]:
     """Record one rollout, look at it under one condition, and count the windows read and those read right."""
     condition = CONDITIONS[str(parameters["condition"])]
     draw = np.random.default_rng([_STREAM, seed])
-    plain = fleet_scheme(TICKS * WINDOWS)
-    channels = tuple(Channel(c.name, c.body, c.axes, WINDOWS, c.sigma) for c in plain.channels)
-    key = Key("rollout", draw.bytes(32), replace(plain, alphabet_size=ALPHABET, channels=channels))
-    symbols = draw.integers(0, ALPHABET, (ROBOTS, WINDOWS))
-    length_s = TICKS / plain.rate_hz
-    # A known start is filmed from before the message to its end; an unknown one from somewhere inside it.
+    job = Job(int(parameters["alphabet_size"]), int(parameters["ticks"]), int(parameters["windows"]))
+    plain = fleet_scheme(job.ticks * job.windows)
+    channels = tuple(Channel(c.name, c.body, c.axes, job.windows, c.sigma) for c in plain.channels)
+    key = Key("rollout", draw.bytes(32), replace(plain, alphabet_size=job.alphabet_size, channels=channels))
+    symbols = draw.integers(0, job.alphabet_size, (ROBOTS, job.windows))
+    length_s = job.ticks / plain.rate_hz
+    # A known start is filmed from before the message to its end; an unknown one from somewhere inside it, and one
+    # window longer, so that every symbol is seen whole.
     begin_s = _START_S - 1.0 if condition.start_known else _START_S + float(draw.uniform(0.2, 6.0))
-    end_s = begin_s + 1.0 + WINDOWS * length_s
+    end_s = begin_s + 1.0 + (job.windows + (not condition.start_known)) * length_s
     sent = tuple(int(symbol) for symbol in symbols.ravel())
     settings = RunSettings(key, sent, end_s + 0.2, seed, wire="direct", start_s=_START_S, plant=calibrated_parameters())
     result = run_lockstep(settings)
@@ -88,7 +102,7 @@ def read_under(parameters: Values, seed: int) -> dict[str, Scalar]:
             last_s = (end_s - begin_s - 0.9 * length_s) * condition.clock
             whole = (starts_s >= -0.1 * length_s) & (starts_s <= last_s)
             decided = np.argmax(reading.reading.window_scores, axis=1)
-            right += int(np.sum((decided == own[numbers % WINDOWS]) & whole))
+            right += int(np.sum((decided == own[numbers % job.windows]) & whole))
             read += int(whole.sum())
     return {"read": read, "right": right}
 
