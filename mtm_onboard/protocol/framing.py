@@ -55,8 +55,3 @@ def channel_symbols(symbols: Sequence[int], scheme: Scheme) -> dict[str, tuple[i
         parts[channel.name] = message[start : start + channel.symbols]
         start += channel.symbols
     return parts
-
-
-def message_of_channels(parts: dict[str, tuple[int, ...]], scheme: Scheme) -> tuple[int, ...]:
-    """The inverse of `channel_symbols` for a split message: the parts in the scheme's channel order."""
-    return tuple(symbol for channel in scheme.channels for symbol in parts[channel.name])

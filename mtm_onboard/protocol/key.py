@@ -39,11 +39,15 @@ class Key:
 
 def generate_key(key_id: str, scheme: Scheme) -> Key:
     """A key with a fresh secret from the operating system's generator."""
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", key_id):
+    _check_id(key_id)
+    return Key(key_id, secrets.token_bytes(SECRET_BYTES), scheme)
+
+
+def _check_id(key_id: object) -> None:
+    if not isinstance(key_id, str) or not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", key_id):
         raise MtmError(
             f"the key id {key_id!r} is not usable; take 1 to 64 letters, digits, dots, dashes or underscores"
         )
-    return Key(key_id, secrets.token_bytes(SECRET_BYTES), scheme)
 
 
 def save_key(key: Key, path: Path) -> None:
@@ -70,16 +74,17 @@ def load_key(path: Path) -> Key:
     unknown = sorted(table.keys() - _FIELDS)
     if unknown:
         raise MtmError(f"{path} has an unknown field {unknown[0]!r}; remove it or correct its spelling")
-    if table.get("format") != KEY_FORMAT:
+    if table.get("format") is True or table.get("format") != KEY_FORMAT:
         raise MtmError(
             f"{path} is of key format {table.get('format')!r}, this program reads {KEY_FORMAT}; provision it anew"
         )
     missing = sorted(_FIELDS - table.keys())
     if missing:
         raise MtmError(f"{path} lacks {', '.join(missing)}; it may be cut off, so provision it anew")
-    if not isinstance(table["id"], str) or not isinstance(table["scheme"], dict):
-        raise MtmError(f"{path}: id must be text and scheme a table; provision it anew")
+    if not isinstance(table["scheme"], dict):
+        raise MtmError(f"{path}: the scheme must be a table ([scheme]); provision it anew")
     try:
+        _check_id(table["id"])
         scheme = scheme_from_table(table["scheme"])
     except MtmError as error:
         raise MtmError(f"{path}: {error}") from error

@@ -213,3 +213,8 @@ def test_a_body_hardly_ever_seen_is_refused():
 def test_any_number_comes_back(number):
     symbols = symbols_of_number(number, PAIR.scheme)
     assert decode_tracks(pair(symbols), PAIR, KNOWN).message == number
+
+
+def test_a_position_that_nothing_can_have_is_refused_before_it_spoils_the_sums():
+    with pytest.raises(MtmError, match="beyond 1e\\+09 m"):
+        Track("robot0", np.arange(3.0), np.array([[0.0, 0.0], [1e300, 0.0], [0.0, 0.0]]), np.ones(3, bool))

@@ -51,6 +51,9 @@ def test_an_existing_key_file_is_never_overwritten(written):
     [
         ("format = 1", "format = 2", "key format 2"),
         ("format = 1", "", "lacks|format None"),
+        ("format = 1", "format = true", "key format True"),
+        ('id = "fleet-7"', 'id = "fleet\\u0007"', "key id"),
+        ('id = "fleet-7"', "id = 7", "key id 7"),
         ("[scheme]", "[scheme", "not valid TOML"),
         ('id = "fleet-7"', 'id = "fleet-7"\ncolour = "red"', "unknown field 'colour'"),
         ("band_hz = [0.5, 5.0]", "band_hz = [0.5, 25.0]", "below 25.0 Hz"),
