@@ -13,7 +13,7 @@ Bools = NDArray[np.bool_]
 
 
 # Farther than anything is seen; a slip in a file, which sums of squares could not hold.
-_FARTHEST = 1e9
+FARTHEST = 1e9
 
 
 @dataclass(frozen=True)
@@ -48,5 +48,5 @@ class Track:
             )
         if not np.all(np.isfinite(self.positions[self.valid])):
             raise MtmError(f"track {self.name!r} has positions that are not numbers; leave those rows out")
-        if np.any(np.abs(self.positions[self.valid]) > _FARTHEST):
-            raise MtmError(f"track {self.name!r} has positions beyond {_FARTHEST:g} {self.unit}; leave those rows out")
+        if np.any(np.abs(self.positions[self.valid]) > FARTHEST):
+            raise MtmError(f"track {self.name!r} has positions beyond {FARTHEST:g} {self.unit}; leave those rows out")

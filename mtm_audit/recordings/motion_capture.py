@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mtm_audit.recordings.text import read_lines
-from mtm_audit.tracks import Floats, Track
+from mtm_audit.tracks import FARTHEST, Floats, Track
 from mtm_onboard.protocol.errors import MtmError
 
 TUM_COLUMNS = 8
@@ -105,5 +105,8 @@ def _track(path: Path, numbers: list[int], times_s: Floats, positions: Floats, y
         )
     valid = np.asarray(np.all(np.isfinite(positions), axis=1), dtype=np.bool_)
     positions = np.where(valid[:, None], positions, np.nan)
+    far = np.flatnonzero(np.any(np.abs(positions) > FARTHEST, axis=1))
+    if len(far):
+        raise MtmError(f"{path}, line {numbers[far[0]]}: a position beyond {FARTHEST:g} m; mend or remove the line")
     headings = None if yaws is None else np.where(np.isfinite(yaws), yaws, np.nan)
     return Track(path.stem, times_s, positions, valid, headings_rad=headings)
