@@ -15,7 +15,6 @@ from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.framing import payload_bits
 from mtm_onboard.protocol.scheme import Scheme
 
-STAGES = ("key", "recording", "tracks", "glimpse", "timing", "detector", "symbols", "message", "verdict")
 _TRY = {
     "key": "make one with mtm-onboard keygen, or name the file that the robot was provisioned with",
     "recording": "play the file in another program to see whether it is whole",

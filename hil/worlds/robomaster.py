@@ -14,7 +14,6 @@ from mtm_onboard.protocol import Channel, Scheme
 
 ROBOTS = 4
 BASE_SPEED_MPS = 0.5
-ARENA_HALF_M = 2.4
 
 _GAIN_PER_S = 1.5
 _HEADING_GAIN_PER_S = 2.0

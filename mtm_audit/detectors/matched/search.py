@@ -91,14 +91,18 @@ def search_timings(
             here = [item for item in chosen[number] if item.coarse == coarse]
             if here:
                 best[number] = max(best[number], _weigh(heard, grid, numbered, here, motion.step_s), key=_evidence)
-    results = []
-    for number, (_, winner) in enumerate(best):
+    found_at: dict[int, Found] = {}
+    winning = sorted({winner.coarse for _, winner in best})
+    for done, coarse in enumerate(winning):
         if progress is not None:
-            progress(0.5 + 0.5 * number / len(best))
-        heard, grid = place(winner.coarse)
-        start = winner.hypothesis.start
-        results.append(_surroundings(heard, grid, tones[number], start, motion, lead, onset_known=onset_s is not None))
-    return results
+            progress(0.5 + 0.5 * done / len(winning))
+        heard, grid = place(coarse)
+        for number, (_, winner) in enumerate(best):
+            if winner.coarse == coarse:
+                start = winner.hypothesis.start
+                known = onset_s is not None
+                found_at[number] = _surroundings(heard, grid, tones[number], start, motion, lead, onset_known=known)
+    return [found_at[number] for number in range(len(best))]
 
 
 def _evidence(weighed: tuple[float, _Candidate]) -> float:
