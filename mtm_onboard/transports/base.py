@@ -13,10 +13,11 @@ class Transport(ABC):
     A subclass implements `open`, `send`, `stop` and `close`. `send` refuses non-finite velocities with ValueError
     before anything is packed. `service` does what the link needs between commands (heartbeats, telemetry); the
     runtime calls it at least every `service_period_s`, on the robot from a thread of its own, so a subclass guards
-    whole messages with a lock.
+    whole messages with a lock. `write_bound_s` is the longest that `send` may wait for the far end.
     """
 
     service_period_s: float = 0.010
+    write_bound_s: float = 0.005
 
     @abstractmethod
     def open(self) -> None:
@@ -36,6 +37,10 @@ class Transport(ABC):
 
     def service(self, now_s: float) -> None:  # noqa: B027 - most links need nothing between commands
         """Do what is due at `now_s` (seconds of the runtime's clock)."""
+
+    def health(self) -> dict[str, int | float | str | bool]:
+        """Counters and states of the link by name, for reports; empty when the link keeps none."""
+        return {}
 
     def __enter__(self) -> Self:
         self.open()
