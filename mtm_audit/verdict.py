@@ -1,5 +1,6 @@
 """The verdict: how unlikely the evidence would be if no message of this key were there."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -23,19 +24,30 @@ _LEAST_TAIL = 1e-300
 
 @dataclass(frozen=True)
 class Evidence:
-    """The key's strength beside that of its decoys, and the p-value that follows."""
+    """The key's strength beside that of its decoys, and the p-value that follows.
+
+    `in_nats` when strengths are log evidences against a recording without a message.
+    """
 
     strength: float
     decoy_strengths: Floats
     p_value: float
+    in_nats: bool = False
+
+    def bits(self, channels: int) -> float:
+        """The evidence of `channels` channels, over which the strength is a mean, in bits.
+
+        A log evidence is added up over the channels and may be negative; any other strength counts as much as its
+        p-value, -log2 of it.
+        """
+        if self.in_nats:
+            return self.strength * channels / math.log(2.0)
+        return -math.log2(max(self.p_value, _LEAST_TAIL))
 
 
 def decoy_codebooks(key: Key, count: int) -> list[Codebook]:
     """Codebooks of keys that nobody holds, derived from this key so that every decode of a file says the same."""
-    return [
-        Codebook(stream(key.secret, "decoy", (number,), SECRET_BYTES), key.scheme, key.scheme.epoch)
-        for number in range(count)
-    ]
+    return [Codebook(stream(key.secret, "decoy", (number,), SECRET_BYTES), key.scheme) for number in range(count)]
 
 
 def weigh_log_evidence(strength: float, decoy_strengths: Floats) -> Evidence:
@@ -53,11 +65,11 @@ def weigh_log_evidence(strength: float, decoy_strengths: Floats) -> Evidence:
     if strength > threshold:
         mean = max(float(np.mean(falling[:excesses] - threshold)), 1e-300)
         beyond = (1.0 + (strength - threshold) / (excesses * mean)) ** -excesses
-        return Evidence(strength, decoy_strengths, float((excesses + 1) / (count + 1) * beyond))
+        return Evidence(strength, decoy_strengths, float((excesses + 1) / (count + 1) * beyond), in_nats=True)
     # Between two decoys the rank is interpolated; below the last one the range of them all is taken to go on.
     points = np.concatenate([falling, [falling[-1] - np.ptp(falling) - 1e-300]])
     rank = float(np.interp(-strength, -points, np.arange(1, count + 2)))
-    return Evidence(strength, decoy_strengths, rank / (count + 1))
+    return Evidence(strength, decoy_strengths, rank / (count + 1), in_nats=True)
 
 
 def weigh(strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:

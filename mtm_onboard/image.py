@@ -94,7 +94,7 @@ def channel_image(
         message_ticks=scheme.message_ticks,
         messages=messages,
         first_message=first_message,
-        epoch=codebook.epoch,
+        epoch=scheme.epoch,
         fingerprint=scheme.fingerprint,
         repeats=repeat and scheme.schedule == "fixed",
         steps=(steps[0], steps[1], steps[2]),

@@ -8,21 +8,26 @@ from numpy.typing import NDArray
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.keystream import SECRET_BYTES
 from mtm_onboard.protocol.scheme import Channel, Scheme
+from mtm_onboard.protocol.slots import epoch_of_slot
 from mtm_onboard.protocol.waveform import Complexes, Floats, draw_tones, evaluate_window, phasors, tone_bins
 
 
 class Codebook:
-    """Waveforms of one secret under one scheme. `epoch` defaults to the scheme's own."""
+    """Waveforms of one secret under one scheme.
 
-    def __init__(self, secret: bytes, scheme: Scheme, epoch: int | None = None) -> None:
+    A channel's windows count from the first one of message slot `first_slot`, see `slots`; under the fixed schedule
+    every message has the same waveforms and the slot does not matter.
+    """
+
+    def __init__(self, secret: bytes, scheme: Scheme, first_slot: int = 0) -> None:
         if len(secret) != SECRET_BYTES:
             raise MtmError(f"a secret has {SECRET_BYTES} bytes, not {len(secret)}; make one with mtm-onboard keygen")
         self._secret = secret
         self.scheme = scheme
-        self.epoch = scheme.epoch if epoch is None else epoch
+        self.first_slot = first_slot
 
     def __repr__(self) -> str:
-        return f"Codebook(scheme={self.scheme.name!r}, epoch={self.epoch})"
+        return f"Codebook(scheme={self.scheme.name!r}, first_slot={self.first_slot})"
 
     def bins(self, channel: Channel) -> NDArray[np.int64]:
         """In-band bins of the channel's window, shape (K,)."""
@@ -31,12 +36,12 @@ class Codebook:
     def tones(self, channel: Channel, window: int, symbols: Sequence[int] | None = None) -> Complexes:
         """Complex tones of the asked symbols (all M when None): shape (symbols, axes, K), see `waveform.phasors`.
 
-        `window` counts this channel's windows from the first one of the epoch; under the fixed schedule every
-        window shares one set of waveforms. Raises MtmError for a symbol outside the alphabet.
+        `window` counts this channel's windows from the first one of `first_slot`. Raises MtmError for a symbol
+        outside the alphabet and, under the rolling schedule, for a window before the Unix epoch.
         """
         scheme = self.scheme
         asked = range(scheme.alphabet_size) if symbols is None else symbols
-        played = 0 if scheme.schedule == "fixed" else window
+        epoch, played = self._place(channel, window)
         first_axis = scheme.axis_index(channel)
         count = len(self.bins(channel))
         amplitudes = np.empty((len(asked), len(channel.axes), count))
@@ -46,7 +51,7 @@ class Codebook:
                 raise MtmError(f"symbol {symbol} is outside the alphabet; choose 0 to {scheme.alphabet_size - 1}")
             for axis in range(len(channel.axes)):
                 amplitudes[row, axis], phases_rad[row, axis] = draw_tones(
-                    self._secret, self.epoch, played, symbol, first_axis + axis, count
+                    self._secret, epoch, played, symbol, first_axis + axis, count
                 )
         return phasors(amplitudes, phases_rad, scheme.power)
 
@@ -54,3 +59,11 @@ class Codebook:
         """Unit-variance waveforms at the window's whole ticks: shape (symbols, axes, window_ticks)."""
         tones = self.tones(channel, window, symbols)
         return evaluate_window(tones, self.bins(channel), self.scheme.window_ticks(channel))
+
+    def _place(self, channel: Channel, window: int) -> tuple[int, int]:
+        """Epoch and window number under which the keyed stream has this window."""
+        if self.scheme.schedule == "fixed":
+            return self.scheme.epoch, 0
+        later, place = divmod(window, channel.symbols)
+        epoch, slot = epoch_of_slot(self.first_slot + later, self.scheme)
+        return epoch, slot * channel.symbols + place

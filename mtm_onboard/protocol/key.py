@@ -32,9 +32,9 @@ class Key:
     secret: bytes = field(repr=False)
     scheme: Scheme
 
-    def codebook(self) -> Codebook:
-        """All waveforms of this key."""
-        return Codebook(self.secret, self.scheme)
+    def codebook(self, first_slot: int = 0) -> Codebook:
+        """All waveforms of this key, with windows counted from message slot `first_slot` on."""
+        return Codebook(self.secret, self.scheme, first_slot)
 
 
 def generate_key(key_id: str, scheme: Scheme) -> Key:

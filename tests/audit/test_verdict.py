@@ -76,7 +76,7 @@ def test_no_decoy_is_the_key_s_own_codebook_or_another_key_s_decoy():
 
 def test_decoys_play_the_key_s_epoch():
     key = key_of(scheme_of(epoch=7))
-    assert {codebook.epoch for codebook in decoy_codebooks(key, 3)} == {7}
+    assert {codebook.scheme.epoch for codebook in decoy_codebooks(key, 3)} == {7}
 
 
 @pytest.mark.parametrize("law", ["exponential", "normal", "gumbel", "uniform"])

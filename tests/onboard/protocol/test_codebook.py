@@ -2,6 +2,8 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from mtm_onboard.protocol import Channel, Codebook, MtmError, Scheme
 from mtm_onboard.protocol import codebook as module
@@ -49,10 +51,41 @@ def test_a_fixed_schedule_repeats_and_a_rolling_one_never_does():
 
 def test_epochs_and_keys_share_no_waveform():
     channel = scheme().channels[0]
-    books = [Codebook(FAKE_SECRET, scheme()), Codebook(FAKE_SECRET, scheme(), epoch=1), Codebook(bytes(32), scheme())]
+    books = [Codebook(FAKE_SECRET, scheme()), Codebook(FAKE_SECRET, scheme(epoch=1)), Codebook(bytes(32), scheme())]
     first = [book.tones(channel, 0) for book in books]
     assert not np.allclose(first[0], first[1])
     assert not np.allclose(first[0], first[2])
+
+
+@given(st.integers(0, 10**8), st.integers(0, 40), st.sampled_from([600, 4_950]))
+def test_counting_from_another_slot_gives_the_same_waveforms(first_slot, window, message_ticks):
+    rolling = scheme(schedule="rolling", message_ticks=message_ticks)
+    channel = rolling.channels[1]
+    absolute = first_slot * channel.symbols + window
+    later, whole = Codebook(FAKE_SECRET, rolling, first_slot), Codebook(FAKE_SECRET, rolling)
+    assert np.array_equal(later.tones(channel, window, [2]), whole.tones(channel, absolute, [2]))
+
+
+def test_each_day_begins_an_epoch_whose_windows_count_from_zero():
+    # 7,200 messages of 12 s fill a day.
+    today = Codebook(FAKE_SECRET, scheme(schedule="rolling", epoch=5), first_slot=7_200)
+    tomorrow_as_epoch = Codebook(FAKE_SECRET, scheme(schedule="rolling", epoch=6))
+    for channel in today.scheme.channels:
+        for window in range(-2, 4):
+            if window >= 0:
+                assert np.array_equal(today.tones(channel, window), tomorrow_as_epoch.tones(channel, window))
+            else:
+                assert not np.allclose(today.tones(channel, window), tomorrow_as_epoch.tones(channel, 0))
+
+
+def test_a_window_before_1970_is_refused_under_the_rolling_schedule_alone():
+    book = Codebook(FAKE_SECRET, scheme(schedule="rolling"), first_slot=2)
+    channel = book.scheme.channels[1]
+    book.tones(channel, -6, [0])
+    with pytest.raises(MtmError, match="set the clock"):
+        book.tones(channel, -7, [0])
+    fixed = Codebook(FAKE_SECRET, scheme(), first_slot=2)
+    assert np.array_equal(fixed.tones(channel, -7), fixed.tones(channel, 0))
 
 
 def test_a_symbol_outside_the_alphabet_and_a_short_secret_are_refused():
