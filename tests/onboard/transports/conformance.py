@@ -33,6 +33,14 @@ class Rig:
     def settle(self):
         self.clock.sleep_until(self.clock.now() + 0.05)
 
+    def is_engaged(self):
+        """Whether the robot obeys velocities."""
+        return self.controller.work_mode
+
+    def is_released(self):
+        """Whether the robot was told to stand still; a robot whose link cannot disengage it overrides this."""
+        return not self.controller.work_mode
+
 
 class TransportConformance:
     @pytest.fixture
@@ -63,7 +71,7 @@ class TransportConformance:
     def test_opening_alone_moves_nothing(self, rig):
         with rig.transport:
             rig.settle()
-            assert rig.controller.work_mode
+            assert rig.is_engaged()
         assert rig.plant.position_xy_m == (0.0, 0.0)
 
     def test_leaving_stops_the_robot(self, rig):
@@ -72,7 +80,7 @@ class TransportConformance:
             assert rig.plant.velocity_body != STOP
         rig.settle()
         assert rig.plant.velocity_body == STOP
-        assert not rig.controller.work_mode
+        assert rig.is_released()
 
     def test_an_exception_stops_the_robot_and_comes_through(self, rig):
         def fail_while_driving():
@@ -84,7 +92,7 @@ class TransportConformance:
             fail_while_driving()
         rig.settle()
         assert rig.plant.velocity_body == STOP
-        assert not rig.controller.work_mode
+        assert rig.is_released()
 
     def test_stop_and_close_may_be_called_again_and_again(self, rig):
         rig.transport.open()
@@ -96,7 +104,7 @@ class TransportConformance:
         rig.transport.stop()
         rig.settle()
         assert rig.plant.velocity_body == STOP
-        assert not rig.controller.work_mode
+        assert rig.is_released()
 
     def test_a_link_that_was_never_opened_can_be_stopped_and_closed(self, rig):
         rig.transport.stop()
