@@ -11,7 +11,7 @@ from tests.onboard.schemes import small_scheme
 
 # T = 120 and 150 divide a day at 50 Hz, 1,110 and 4,950 do not; the odd rates have no exact floating-point number.
 SCHEMES = [small_scheme(message_ticks=ticks) for ticks in (120, 150, 1_110, 4_950)]
-SCHEMES += [small_scheme(rate_hz=rate_hz) for rate_hz in (49.95, 33.3)]
+SCHEMES += [small_scheme(rate_hz=rate_hz) for rate_hz in (49.95, 66.6)]
 A_DAY_LONG = small_scheme(rate_hz=5.0, message_ticks=5 * 86_424, band_hz=(1.0, 1.001))
 schemes = st.sampled_from(SCHEMES)
 times_s = st.floats(0.0, 4e9)
