@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test lint bench firmware clean
+.PHONY: setup demo test lint bench firmware deb clean
 
 setup: $(STAMP)
 
@@ -32,8 +32,11 @@ lint: setup
 firmware: setup
 	$(MAKE) -C firmware_shim
 
+deb:
+	$(PYTHON) packaging/build_deb.py
+
 bench: setup
 	$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-only -s
 
 clean:
-	rm -rf $(VENV) out build firmware_shim/build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) out build dist firmware_shim/build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
