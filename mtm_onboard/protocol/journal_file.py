@@ -1,0 +1,199 @@
+"""The journal's file: what was commanded, tick by tick, as comma-separated text.
+
+The first line is `# ` and the header in JSON, the second names the columns, and each further line is a tick or, after
+`# `, an event in JSON. A long run is a row of such files, its segments: `robot.csv` is being written, those numbered
+from `robot.csv.000001` on came before it, and the oldest may have been removed. Each segment begins with the header and
+with the run's latest events, so that it can be read alone.
+"""
+
+import glob
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mtm_onboard.protocol.errors import MtmError
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+# Bits of a row's flags. UNSENT: the link took the command of this tick nowhere. HELD: the link is down, or no base
+# command has come since it came back.
+NOISE, STALE, STOPPED, CLAMPED, REFUSED, HELD, UNSENT = 1, 2, 4, 8, 16, 32, 64
+
+COLUMNS = (
+    "tick", "time_s", "base_vx_mps", "base_vy_mps", "base_wz_radps", "sent_vx_mps", "sent_vy_mps", "sent_wz_radps",
+    "lateness_s", "flags",
+)  # fmt: skip
+_NUMBER_DIGITS = 6
+
+
+@dataclass(frozen=True)
+class JournalHeader:
+    """What the rows belong to. `symbols` is the whole message, None when only base commands were sent.
+
+    `start_s` is tick 0 on the runtime's clock and `start_unix_s` the same instant in seconds since the Unix epoch,
+    None in simulated time. The secret is not here.
+    """
+
+    fingerprint: str
+    key_id: str
+    robot: str
+    channel: str
+    symbols: tuple[int, ...] | None
+    repeat: bool
+    rate_hz: float
+    start_s: float
+    start_unix_s: float | None
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened once, in one sentence, at the tick that was next or under way."""
+
+    tick: int
+    text: str
+
+
+@dataclass(frozen=True)
+class JournalRecord:
+    """A journal read back: n rows. `base` and `sent` are (n, 3): vx, vy in m/s and wz in rad/s.
+
+    `flags` are the bits above; `damaged` counts lines that could not be read.
+    """
+
+    header: JournalHeader
+    ticks: Integers
+    times_s: Floats
+    base: Floats
+    sent: Floats
+    lateness_s: Floats
+    flags: Integers
+    damaged: int
+    events: tuple[Event, ...] = ()
+
+    @property
+    def noise(self) -> Floats:
+        """What was added to the base command and reached the link, shape (n, 3); zero in ticks that were not sent."""
+        reached = (self.flags & UNSENT) == 0
+        noise: Floats = np.where(reached[:, None], self.sent - self.base, 0.0)
+        return noise
+
+
+def heading(header: JournalHeader, events: Iterable[Event] = ()) -> bytes:
+    """The lines that a segment begins with."""
+    first = f"# {json.dumps(asdict(header))}\n{','.join(COLUMNS)}\n"
+    return first.encode() + b"".join(map(event_line, events))
+
+
+def event_line(event: Event) -> bytes:
+    """One event as a line."""
+    return f"# {json.dumps(asdict(event))}\n".encode()
+
+
+def segments(path: Path) -> list[Path]:
+    """The files of the journal `path`, oldest first; empty when there is none."""
+    kept = [
+        other
+        for other in path.parent.glob(f"{glob.escape(path.name)}.*")
+        if len(number := other.name[len(path.name) + 1 :]) == _NUMBER_DIGITS and number.isdecimal()
+    ]
+    return sorted(kept) + ([path] if path.exists() else [])
+
+
+def kept_segment(path: Path, number: int) -> Path:
+    """The name under which the segment `number` of `path`, counted from 1, is kept."""
+    return path.with_name(f"{path.name}.{number:0{_NUMBER_DIGITS}d}")
+
+
+def read_journal(path: Path) -> JournalRecord:
+    """Read all segments of a journal; lines that a full disk or a crash left damaged are skipped and counted.
+
+    Raises MtmError when a file cannot be read or none has a header.
+    """
+    header: JournalHeader | None = None
+    tables: list[Floats] = []
+    events: dict[Event, None] = {}
+    damaged = 0
+    for segment in segments(path) or [path]:
+        try:
+            lines = segment.read_text(encoding="utf-8", errors="replace").split("\n")
+        except OSError as error:
+            raise MtmError(f"cannot read the journal {segment}: {error.strerror}; check the name") from error
+        content = _content(lines)
+        header = content.header or header
+        tables.append(content.rows)
+        events.update(dict.fromkeys(content.events))
+        damaged += content.damaged
+    if header is None:
+        raise MtmError(f"{path} does not begin like a journal; name a file that mtm-onboard run wrote")
+    columns = np.concatenate(tables)
+    return JournalRecord(
+        header, columns[:, 0].astype(np.int64), columns[:, 1], columns[:, 2:5], columns[:, 5:8], columns[:, 8],
+        columns[:, 9].astype(np.int64), damaged, tuple(events),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Content:
+    """What one segment holds; `rows` (n, columns)."""
+
+    header: JournalHeader | None
+    rows: Floats
+    events: list[Event]
+    damaged: int
+
+
+def _content(lines: list[str]) -> _Content:
+    header, rows, events, damaged = None, [], [], int(bool(lines[-1]))
+    names = ",".join(COLUMNS)
+    for line in lines[:-1]:
+        if line.startswith("#"):
+            table = _table(line)
+            event, begun = _event(table), _header(table)
+            if event is not None:
+                events.append(event)
+            damaged += event is None and begun is None
+            header = begun or header
+        elif (row := _numbers(line)) is not None:
+            rows.append(row)
+        elif line and line != names:
+            damaged += 1
+    columns = np.array(rows, dtype=np.float64).reshape(-1, len(COLUMNS))
+    sound = np.isfinite(columns).all(axis=1)
+    return _Content(header, columns[sound], events, damaged + int(np.count_nonzero(~sound)))
+
+
+def _header(table: dict[str, Any]) -> JournalHeader | None:
+    try:
+        symbols = table["symbols"]
+        return JournalHeader(**table | {"symbols": None if symbols is None else tuple(symbols)})
+    except (TypeError, KeyError):
+        return None
+
+
+def _event(table: dict[str, Any]) -> Event | None:
+    tick, text = table.get("tick"), table.get("text")
+    return Event(tick, text) if isinstance(tick, int) and isinstance(text, str) else None
+
+
+def _table(line: str) -> dict[str, Any]:
+    """The JSON object after `# `; empty when there is none."""
+    try:
+        table = json.loads(line.removeprefix("# "))
+    except ValueError:
+        return {}
+    return table if isinstance(table, dict) else {}
+
+
+def _numbers(line: str) -> list[float] | None:
+    try:
+        numbers = list(map(float, line.split(",")))
+    except ValueError:
+        return None
+    return numbers if len(numbers) == len(COLUMNS) else None
