@@ -14,6 +14,6 @@ def small_scheme(**changes) -> Scheme:
     return Scheme(**(plain | changes))
 
 
-def small_codebook(**changes) -> Codebook:
+def small_codebook(first_slot: int = 0, **changes) -> Codebook:
     """The codebook of `small_scheme` under the fake secret."""
-    return Codebook(FAKE_SECRET, small_scheme(**changes))
+    return Codebook(FAKE_SECRET, small_scheme(**changes), first_slot)

@@ -3,6 +3,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+from mtm_onboard.message import PlainMessage
 from mtm_onboard.modulator import Modulator
 from mtm_onboard.motion import BodyVelocity
 from mtm_onboard.protocol import Channel, MtmError
@@ -99,6 +100,112 @@ def test_a_channel_of_joints_serves_a_policy_but_no_body_velocity():
     assert modulator.substitute(3, np.zeros(2), 1.0) == pytest.approx(modulator.perturbation(3))
     with pytest.raises(MtmError, match="shoulder, elbow"):
         modulator.add(3, BASE)
+
+
+def changing(schedule: str, at_tick: int, ticks: int, **options) -> tuple[np.ndarray, int | None]:
+    """What is played when (1, 1, 3) is queued before `at_tick`, and from which tick on it is."""
+    modulator = Modulator(small_codebook(schedule=schedule), "b", (3, 0, 2), **options)
+    before = played(modulator, range(-10, at_tick))
+    queued = modulator.queue((1, 1, 3))
+    after = played(modulator, range(at_tick, ticks))
+    return np.concatenate([before, after])[10:], queued.start_tick(0.0)
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+@pytest.mark.parametrize(("at_tick", "boundary"), [(-5, 0), (0, 120), (1, 120), (119, 120), (120, 240), (230, 240)])
+def test_a_queued_message_takes_effect_exactly_at_the_next_boundary(schedule, at_tick, boundary):
+    book = small_codebook(schedule=schedule)
+    one, other = (played(Modulator(book, "b", symbols), range(480)) for symbols in ((3, 0, 2), (1, 1, 3)))
+    noise, start_tick = changing(schedule, at_tick, 480)
+    assert start_tick == boundary
+    assert np.array_equal(noise, np.concatenate([one[:boundary], other[boundary:]]))
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+def test_a_queued_message_that_is_not_repeated_follows_the_silence_and_ends_in_silence(schedule):
+    noise, start_tick = changing(schedule, 200, 600, repeat=False)
+    assert start_tick == 240
+    silent = ~noise.any(axis=1)
+    assert [bool(silent[tick]) for tick in (119, 120, 239, 240, 359, 360, 599)] == [
+        False, True, True, False, False, True, True,
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+def test_nothing_is_derived_in_the_tick_that_sends_when_the_message_changes(schedule):
+    book = small_codebook(schedule=schedule)
+    modulator = Modulator(book, "b", (3, 0, 2))
+    for tick in range(400):
+        if tick in (50, 119, 200):
+            modulator.queue((tick % 4, 1, 2))
+        with patch.object(book, "samples", side_effect=AssertionError("derived while sending")):
+            modulator.add(tick, BASE)
+        modulator.prepare(tick)
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+def test_a_stall_across_the_boundary_of_a_change_shifts_nothing(schedule):
+    book = small_codebook(schedule=schedule)
+    modulator = Modulator(book, "b", (3, 0, 2))
+    played(modulator, range(60))
+    modulator.queue((1, 1, 3))
+    played(modulator, [60])
+    other = played(Modulator(book, "b", (1, 1, 3)), range(400))
+    assert np.array_equal(played(modulator, range(170, 400)), other[170:])
+
+
+def test_the_last_of_several_queued_before_a_boundary_is_played_and_each_hears_the_same_start():
+    book = small_codebook()
+    modulator = Modulator(book, "a", (0,))
+    first = modulator.queue((1,))
+    played(modulator, range(10))
+    assert (modulator.message, modulator.waiting) == ((0,), (1,))
+    second, third = modulator.queue((2,)), modulator.queue((3,))
+    played(modulator, range(10, 121))
+    assert {one.start_tick(0.0) for one in (first, second, third)} == {120}
+    assert (modulator.message, modulator.waiting) == ((3,), None)
+
+
+def test_what_no_tick_has_taken_up_can_be_withdrawn_and_nothing_else():
+    modulator = Modulator(small_codebook(), "a", (0,))
+    queued = modulator.queue((1,))
+    assert queued.start_tick(0.0) is None
+    assert modulator.withdraw(queued)
+    taken = modulator.queue((2,))
+    played(modulator, [0])
+    assert not modulator.withdraw(taken)
+    assert not modulator.withdraw(queued)
+    assert modulator.waiting == (2,)
+
+
+def test_a_wrong_message_is_refused_when_it_is_queued_and_the_present_one_goes_on():
+    modulator = Modulator(small_codebook(), "a", (0,))
+    with pytest.raises(MtmError, match="outside the alphabet"):
+        modulator.queue((4,))
+    with pytest.raises(MtmError, match="2 symbols given"):
+        modulator.queue(PlainMessage((1, 2)))
+    played(modulator, range(200))
+    assert modulator.message == (0,)
+
+
+def test_a_whole_message_gives_each_channel_its_part_of_the_slot_at_hand():
+    book = small_codebook(schedule="rolling", first_slot=36_000 - 2)
+    modulator = Modulator(book, "b", Counting())
+    noise = played(modulator, range(120 * 5)).reshape(5, 3, 40)
+    absolute, channel = small_codebook(schedule="rolling"), book.scheme.channel("b")
+    for later in range(5):
+        slot = 36_000 - 2 + later
+        expected = [absolute.samples(channel, 3 * slot + place, [(slot + place) % 4])[0, 0] for place in range(3)]
+        assert np.array_equal(noise[later], expected)
+
+
+class Counting:
+    """Other symbols in every slot: 0 for channel "a", and for "b" the slot's number counted on."""
+
+    number = 0
+
+    def symbols(self, slot: int) -> tuple[int, ...]:
+        return (0, *((slot + place) % 4 for place in range(3)))
 
 
 def test_a_wrong_channel_and_wrong_symbols_are_refused():
