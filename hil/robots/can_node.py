@@ -1,11 +1,11 @@
 """The robot's end of the CAN wire: the motion controller as a node on the bus."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from hil.robots.mecanum import RIM_MPS_PER_RPM, body_velocity
 from hil.robots.motion_controller import MotionController
+from hil.robots.odometry import Odometry, turned
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.transports.can_stream import Bus, CanStream
 from mtm_onboard.transports.duml import ACK, WANTS_ACK, Message
@@ -77,8 +77,7 @@ class CanMotionController:
         self._wire = CanStream(bus, FROM_MOTION_CONTROLLER_ID, FROM_COMPANION_ID)
         self._sequence = SequenceCounters()
         self._streams: dict[int, _Stream] = {}
-        self._start_xy_m = controller.plant.position_xy_m
-        self._start_heading_rad = controller.plant.heading_rad
+        self._odometry = Odometry(controller.plant)
         self._handlers: dict[tuple[int, int, int], Callable[[Message, float], bytes | None]] = {
             (kind.receiver, kind.cmdset, kind.cmdid): handler
             for kind, handler in (
@@ -171,22 +170,13 @@ class CanMotionController:
         return _DONE if known else _REFUSED
 
     def _telemetry(self, now_s: float) -> Telemetry:
-        plant = self.controller.plant
-        body_x, body_y, _ = plant.velocity_body
-        heading_rad = math.remainder(plant.heading_rad - self._start_heading_rad, math.tau)
-        x_m, y_m = plant.position_xy_m
-        start_x_m, start_y_m = self._start_xy_m
+        body_x, body_y, _ = self.controller.plant.velocity_body
+        odometry = self._odometry
         return Telemetry(
             robot_time_s=now_s,
             received_s=now_s,
             velocity_body_mps=(body_x, body_y),
-            velocity_start_mps=_turned(body_x, body_y, heading_rad),
-            position_xy_m=_turned(x_m - start_x_m, y_m - start_y_m, -self._start_heading_rad),
-            heading_rad=heading_rad,
+            velocity_start_mps=turned(body_x, body_y, odometry.heading_rad),
+            position_xy_m=odometry.position_xy_m,
+            heading_rad=odometry.heading_rad,
         )
-
-
-def _turned(x: float, y: float, angle_rad: float) -> tuple[float, float]:
-    """The vector turned counter-clockwise."""
-    cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
-    return cosine * x - sine * y, sine * x + cosine * y
