@@ -5,7 +5,7 @@ import re
 import secrets
 import stat
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +62,9 @@ def key_text(key: Key) -> str:
     """The key file's text, secret included."""
     lines = [f"format = {KEY_FORMAT}", f'id = "{key.id}"', f'secret = "{key.secret.hex()}"', "", "[scheme]"]
     lines += [f"{name} = {_toml(getattr(key.scheme, name))}" for name in _SCHEME_PARAMETERS]
+    if key.scheme.framing is not None:
+        lines += ["", "[scheme.framing]"]
+        lines += [f"{name} = {_toml(value)}" for name, value in asdict(key.scheme.framing).items()]
     for channel in key.scheme.channels:
         lines += ["", "[[scheme.channels]]"]
         lines += [f"{name} = {_toml(getattr(channel, name))}" for name in _CHANNEL_PARAMETERS]
@@ -119,6 +122,8 @@ def _read_private_toml(path: Path) -> dict[str, Any]:
 
 
 def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
     if isinstance(value, str):
         return f'"{value}"'
     if isinstance(value, tuple):

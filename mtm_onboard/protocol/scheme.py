@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal, get_args
 
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.framing.framing import Framing, layout_of
 
 SCHEME_VERSION = 1
 Combine = Literal["split", "same"]
@@ -42,7 +43,8 @@ class Scheme:
     """Every agreed parameter: rate and band in hertz, alphabet size M, message length T in ticks, channels.
 
     `combine` is "split" (each channel carries its own part of the message) or "same" (all carry all of it, and
-    the auditor pools by `pooling`). `power` and `schedule` are explained in `waveform` and `codebook`.
+    the auditor pools by `pooling`). `power` and `schedule` are explained in `waveform` and `codebook`. `framing` says
+    what a message's symbols spell; None is a plain number.
     Raises MtmError on construction when the scheme cannot be played.
     """
 
@@ -57,6 +59,7 @@ class Scheme:
     power: Power = "window"
     schedule: Schedule = "fixed"
     epoch: int = 0
+    framing: Framing | None = None
     version: int = SCHEME_VERSION
 
     def __post_init__(self) -> None:
@@ -88,7 +91,11 @@ class Scheme:
     @property
     def fingerprint(self) -> str:
         """Sixteen hexadecimal digits that differ when any parameter differs; safe to publish."""
-        canonical = json.dumps(asdict(self), sort_keys=True, separators=(",", ":"))
+        parameters = asdict(self)
+        # A scheme without framing keeps the fingerprint that it had before there was any.
+        if self.framing is None:
+            del parameters["framing"]
+        canonical = json.dumps(parameters, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
 
@@ -130,8 +137,23 @@ def scheme_from_table(table: dict[str, Any]) -> Scheme:
     band = table["band_hz"]
     if not isinstance(band, list) or len(band) != 2:
         raise MtmError("the scheme's band_hz must be two numbers: [low, high]")
-    plain = {name: value for name, value in table.items() if name not in ("channels", "band_hz")}
-    return Scheme(**plain, band_hz=(band[0], band[1]), channels=tuple(_channel_from_table(entry) for entry in entries))
+    plain = {name: value for name, value in table.items() if name not in ("channels", "band_hz", "framing")}
+    return Scheme(
+        **plain,
+        band_hz=(band[0], band[1]),
+        channels=tuple(_channel_from_table(entry) for entry in entries),
+        framing=_framing_from_table(table["framing"]) if "framing" in table else None,
+    )
+
+
+def _framing_from_table(table: object) -> Framing:
+    if not isinstance(table, dict):
+        raise MtmError("the scheme's framing must be a table ([scheme.framing])")
+    _refuse_unknown(table, {field.name for field in fields(Framing)}, "the scheme's framing")
+    missing = sorted({"payload", "payload_bits"} - table.keys())
+    if missing:
+        raise MtmError(f"the scheme's framing lacks {', '.join(missing)}; add it")
+    return Framing(**table)
 
 
 def _channel_from_table(table: dict[str, Any]) -> Channel:
@@ -169,6 +191,8 @@ def _check(scheme: Scheme) -> None:
         _check_channel(scheme, channel)
     if scheme.combine == "same" and len({channel.symbols for channel in scheme.channels}) > 1:
         raise MtmError('combine = "same" needs the same number of symbols on every channel; make them equal')
+    if scheme.framing is not None:
+        layout_of(scheme.framing, scheme.alphabet_size, scheme.message_symbols)
 
 
 def _check_types(scheme: Scheme) -> None:

@@ -1,13 +1,18 @@
-"""Between a message and the symbols on the channels."""
+"""Between a plain number and the symbols on the channels."""
+
+from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from mtm_onboard.protocol.errors import MtmError
-from mtm_onboard.protocol.scheme import Scheme
+
+if TYPE_CHECKING:
+    from mtm_onboard.protocol.scheme import Scheme
 
 
 def payload_bits(scheme: Scheme) -> int:
-    """Whole bits that one message holds: floor(log2(M ** L))."""
+    """Whole bits that the symbols of one message hold, frame or not: floor(log2(M ** L))."""
     count = int(scheme.alphabet_size**scheme.message_symbols)
     return count.bit_length() - 1
 
