@@ -1,5 +1,6 @@
 """The robot's configuration: one TOML file, explained field by field in docs/robot.example.toml."""
 
+import math
 import tomllib
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
@@ -10,8 +11,8 @@ from mtm_onboard.guard import Limits, Staleness
 from mtm_onboard.protocol.errors import MtmError
 
 Option = str | int | float | bool
-_SECTIONS = ("robot", "transport", "limits", "stale", "source", "journal")
-_OPTIONAL_SECTIONS = ("stale", "journal")
+_SECTIONS = ("robot", "transport", "link", "limits", "stale", "source", "journal")
+_OPTIONAL_SECTIONS = ("link", "stale", "journal")
 _SOURCE_KINDS = ("udp", "stdin")
 _T = TypeVar("_T")
 
@@ -41,10 +42,30 @@ class SourceSettings:
 
 
 @dataclass(frozen=True)
+class LinkSettings:
+    """Whether a lost link is opened anew, and after how long without one the run ends with an error.
+
+    A robot that stood still for long may have people near it by then, so waiting for ever is a choice, `inf`.
+    """
+
+    reconnect: bool = True
+    give_up_s: float = 60.0
+
+    def __post_init__(self) -> None:
+        if not self.give_up_s > 0:
+            raise MtmError(f"give_up_s is {self.give_up_s}; give seconds above zero")
+
+
+@dataclass(frozen=True)
 class JournalSettings:
-    """Where the journal goes."""
+    """Where the journal goes, and how many megabytes of it are kept at most; the oldest go first."""
 
     path: str
+    max_mb: float = 200.0
+
+    def __post_init__(self) -> None:
+        if not 1.0 <= self.max_mb < math.inf:
+            raise MtmError(f"max_mb is {self.max_mb}; give a number from 1 on")
 
 
 @dataclass(frozen=True)
@@ -58,6 +79,7 @@ class RobotConfig:
     staleness: Staleness
     source: SourceSettings
     journal: JournalSettings | None
+    link: LinkSettings = LinkSettings()
 
 
 def load_config(path: Path) -> RobotConfig:
@@ -95,6 +117,7 @@ def config_from_table(table: dict[str, Any]) -> RobotConfig:
         staleness=_section(Staleness, "stale", table.get("stale", {})),
         source=_section(SourceSettings, "source", table["source"]),
         journal=_section(JournalSettings, "journal", table["journal"]) if "journal" in table else None,
+        link=_section(LinkSettings, "link", table.get("link", {})),
     )
 
 
@@ -124,7 +147,7 @@ def _section(kind: type[_T], section: str, table: dict[str, Any]) -> _T:
 
 def _check_type(section: str, name: str, value: Any, hint: Any) -> None:
     wanted = set(get_args(hint)) - {type(None)} if isinstance(hint, UnionType) else {hint}
-    words = {str: "text in quotes", int: "a whole number", float: "a number"}
+    words = {str: "text in quotes", int: "a whole number", float: "a number", bool: "true or false"}
     if float in wanted:
         wanted.add(int)
     if type(value) not in wanted:

@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from mtm_onboard.clock import SystemClock
+from mtm_onboard.clock import Clock, SystemClock
 from mtm_onboard.config import RobotConfig, SourceSettings
 from mtm_onboard.guard import Guard
 from mtm_onboard.journal import Journal, JournalHeader
@@ -19,7 +19,9 @@ from mtm_onboard.protocol.framing import channel_symbols
 from mtm_onboard.runtime import Runtime
 from mtm_onboard.service import ServiceThread
 from mtm_onboard.source import Source, StdinSource, UdpSource
+from mtm_onboard.transports.base import Transport
 from mtm_onboard.transports.factory import make_transport
+from mtm_onboard.transports.reconnecting import ReconnectingTransport
 
 # Between opening the link and the message's first tick, so that the loop is running by then.
 _LEAD_S = 0.1
@@ -46,13 +48,15 @@ class Outcome:
     guard: Guard
     source: Source
     journal: Journal | None
+    link_losses: int = 0
 
     def summary(self) -> str:
         """All of it in one line."""
         guard, late_ms = self.guard, [1e3 * self.stats.lateness.quantile_s(part) for part in (0.5, 0.99)]
         kept = f", journal {self.journal.path}, {self.journal.lost} rows lost" if self.journal else ""
         return (
-            f"{self.stats.sent} ticks sent, {self.stats.missed} missed, {guard.clamped} clamped, {guard.stale} stale, "
+            f"{self.stats.sent} ticks sent, {self.stats.missed} missed, {self.stats.overruns} over their period, "
+            f"{guard.clamped} clamped, {guard.stale} stale, {self.link_losses} link losses, "
             f"{self.source.refused + guard.refused} commands refused, "
             f"late p50 {late_ms[0]:.3f} ms p99 {late_ms[1]:.3f} ms{kept}"
         )
@@ -68,7 +72,7 @@ def run_session(config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callabl
     modulator = _modulator(key, channel.name, plan)
     guard = Guard(config.limits, config.staleness, noise_sigma=channel.sigma, period_s=1 / rate_hz)
     clock, stats = SystemClock(), LoopStats()
-    transport = make_transport(config.transport_kind, config.transport_options)
+    transport = _link(config, clock)
     # The stack closes in reverse: the robot is told to stop before a socket or a slow disk is waited for.
     with ExitStack() as stack:
         source = _source(config.source)
@@ -76,6 +80,8 @@ def run_session(config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callabl
         files = stack.enter_context(ExitStack())
         stack.enter_context(transport)
         service = stack.enter_context(ServiceThread(transport, clock))
+        # Before the service's thread is waited for, which a wedged driver may hold.
+        stack.callback(transport.stop)
         now_s, now_unix_s = clock.now(), time.time()
         start_unix_s = now_unix_s + _LEAD_S if plan.start_unix_s is None else plan.start_unix_s
         start_s = now_s + start_unix_s - now_unix_s
@@ -85,7 +91,9 @@ def run_session(config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callabl
                 fingerprint=key.scheme.fingerprint, key_id=key.id, robot=config.robot.name, channel=channel.name,
                 symbols=plan.message, repeat=plan.repeat, rate_hz=rate_hz, start_s=start_s, start_unix_s=start_unix_s,
             )  # fmt: skip
-            journal = files.enter_context(Journal(Path(config.journal.path), header, threaded=True))
+            journal = files.enter_context(
+                Journal(Path(config.journal.path), header, threaded=True, max_bytes=int(1e6 * config.journal.max_mb))
+            )
         runtime = Runtime(modulator, guard, source, transport, journal)
 
         def ending() -> bool:
@@ -95,7 +103,14 @@ def run_session(config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callabl
             run_loop(clock, rate_hz, runtime.step, start_s=start_s, stop=ending, stats=stats)
         if service.error is not None:
             raise MtmError(f"the robot's link failed ({service.error}); check the link") from service.error
-    return Outcome(stats, guard, source, journal)
+    return Outcome(stats, guard, source, journal, runtime.transport_errors)
+
+
+def _link(config: RobotConfig, clock: Clock) -> Transport:
+    def make() -> Transport:
+        return make_transport(config.transport_kind, config.transport_options)
+
+    return ReconnectingTransport(make, clock, give_up_s=config.link.give_up_s) if config.link.reconnect else make()
 
 
 def _modulator(key: Key, channel_name: str, plan: Plan) -> Modulator | None:

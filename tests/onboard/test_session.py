@@ -52,6 +52,7 @@ def config() -> RobotConfig:
         {
             "robot": {"name": "r", "channel": "a"},
             "transport": {"kind": "none"},
+            "link": {"reconnect": False},
             "limits": {"speed_mps": 1.0, "turn_rate_radps": 2.0},
             "source": {"kind": "stdin"},
         }
@@ -88,7 +89,7 @@ def never() -> bool:
 def test_a_run_opens_the_link_and_leaves_it_stopped_and_closed(config, use):
     link = use(Link())
     outcome = run_session(config, KEY, Plan((0, 1, 2, 3), duration_s=0.0), never)
-    assert link.events == ["open", "stop", "close"]
+    assert link.events == ["open", "stop", "stop", "close"]
     assert link.sent == outcome.stats.sent
     assert "ticks sent" in outcome.summary()
     assert "journal" not in outcome.summary()
@@ -97,7 +98,7 @@ def test_a_run_opens_the_link_and_leaves_it_stopped_and_closed(config, use):
 def test_a_run_that_is_asked_to_end_at_once_sends_nothing_but_the_stop(config, use):
     link = use(Link())
     assert run_session(config, KEY, Plan(None), lambda: True).stats.sent == 0
-    assert link.events == ["open", "stop", "close"]
+    assert link.events == ["open", "stop", "stop", "close"]
 
 
 @pytest.mark.parametrize(("failing", "sentence"), [("send", "cable pulled"), ("service", "no heartbeat")])
