@@ -10,10 +10,9 @@ from hil.programs import program
 from hil.rig import LIMITS, RobotReport
 from hil.robots.can_node import CanMotionController
 from hil.robots.slcan_port import SlcanPort
-from mtm_onboard.guard import CLAMPED, REFUSED, STALE
-from mtm_onboard.journal import JournalRecord, read_journal
 from mtm_onboard.motion import STOP
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.journal_file import CLAMPED, REFUSED, STALE, JournalRecord, read_journal
 
 _PATIENCE_S = 5.0
 

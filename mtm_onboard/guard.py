@@ -8,13 +8,7 @@ from dataclasses import dataclass, fields
 
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
-
-# Bits of `Guard.flags`, as the journal records them.
-NOISE = 1
-STALE = 2
-STOPPED = 4
-CLAMPED = 8
-REFUSED = 16
+from mtm_onboard.protocol.journal_file import CLAMPED, HELD, NOISE, REFUSED, STALE, STOPPED, UNSENT
 
 # Instants are sums of decimal fractions, so an age that is within this of a bound has reached it.
 _HAIR_S = 1e-9
@@ -58,20 +52,21 @@ class Staleness:
 class Guard:
     """Holds the limits and the newest good base command; one `admit` and one `limit` a tick.
 
-    `noise_sigma` is the channel's sigma and `period_s` the control period. Counters: `clamped`, `stale` and
-    `refused` ticks. `flags` tells what happened in the tick at hand.
+    `noise_sigma` is the channel's sigma and `period_s` the control period. Counters: `clamped`, `stale`, `refused`,
+    `held` and `unsent` ticks. `flags` tells what happened in the tick at hand, in the bits of
+    `mtm_onboard.protocol.journal_file`.
     """
 
     def __init__(self, limits: Limits, staleness: Staleness, *, noise_sigma: float, period_s: float) -> None:
         self.flags = 0
-        self.clamped = self.stale = self.refused = 0
+        self.clamped = self.stale = self.refused = self.held = self.unsent = 0
         self._speed = limits.speed_mps
         self._turn = limits.turn_rate_radps
         self._noise = limits.noise_sigmas * noise_sigma
         self._step = math.inf if limits.acceleration_mps2 is None else limits.acceleration_mps2 * period_s
         self._noise_off_s = staleness.noise_off_s
         self._stopped_s = staleness.stopped_s
-        self._base = self._last = STOP
+        self._base = self._last = self._before_last = STOP
         self._arrived_s = -math.inf
         self._stopped = False
 
@@ -86,13 +81,14 @@ class Guard:
 
     @property
     def noise_allowed(self) -> bool:
-        """False in a tick whose base command is stale, refused or overruled by a stop."""
-        return not self.flags & (STALE | STOPPED | REFUSED)
+        """False in a tick whose base command is stale, refused, held or overruled by a stop."""
+        return not self.flags & (STALE | STOPPED | REFUSED | HELD)
 
-    def admit(self, base: BodyVelocity, arrived_s: float, now_s: float) -> BodyVelocity:
+    def admit(self, base: BodyVelocity, arrived_s: float, now_s: float, *, after_s: float = -math.inf) -> BodyVelocity:
         """The base command to send at `now_s`: within the limits, ramped down when old, zero after a stop.
 
-        A non-finite command is refused and the last good one goes on ageing in its place.
+        A non-finite command is refused and the last good one goes on ageing in its place. Of commands that did not
+        arrive after `after_s` none is admitted, and the robot is held at a standstill.
         """
         self.flags = 0
         if self._stopped:
@@ -104,6 +100,10 @@ class Guard:
         else:
             self.refused += 1
             self.flags = REFUSED
+        if self._arrived_s <= after_s != -math.inf:
+            self.held += 1
+            self.flags |= HELD
+            return STOP
         age_s = now_s - self._arrived_s + _HAIR_S
         vx_mps, vy_mps, wz_radps = self._base
         kept = 1.0
@@ -124,10 +124,16 @@ class Guard:
     def limit(self, base: BodyVelocity, wanted: BodyVelocity) -> BodyVelocity:
         """What is sent: `base`, as admitted, and as much of the noise `wanted - base` as every limit allows."""
         sent = base if wanted is base or not self.noise_allowed else self._with_noise(base, wanted)
-        if self._step < math.inf and not self.flags & (STALE | STOPPED):
+        if self._step < math.inf and not self.flags & (STALE | STOPPED | HELD):
             sent = self._slewed(base, sent)
-        self._last = sent
+        self._before_last, self._last = self._last, sent
         return sent
+
+    def not_sent(self) -> None:
+        """Say that this tick's command never left: the robot still has the one before it."""
+        self.unsent += 1
+        self.flags |= UNSENT
+        self._last = self._before_last
 
     def _with_noise(self, base: BodyVelocity, wanted: BodyVelocity) -> BodyVelocity:
         base_x, base_y, base_z = base

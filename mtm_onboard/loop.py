@@ -39,11 +39,12 @@ class Lateness:
 
 
 class LoopStats:
-    """What a loop did: ticks `sent`, ticks `missed`, and the lateness of each wake-up."""
+    """What a loop did: ticks `sent`, ticks `missed`, steps that took over a period, and each wake-up's lateness."""
 
     def __init__(self) -> None:
         self.sent = 0
         self.missed = 0
+        self.overruns = 0
         self.lateness = Lateness()
 
 
@@ -77,5 +78,6 @@ def run_loop(
         stats.lateness.record(now_s - deadline_s)
         stats.missed += tick - awaited
         step(tick, now_s)
+        stats.overruns += clock.now() - now_s > 1.0 / rate_hz
         stats.sent += 1
         awaited = tick + 1

@@ -1,5 +1,6 @@
 """The runtime: what happens in one tick, from the newest base command to the robot."""
 
+import math
 from typing import Protocol
 
 from mtm_onboard.guard import Guard
@@ -43,6 +44,10 @@ class Runtime:
         if modulator is not None:
             modulator.require_body_axes()
         self.transport_errors = 0
+        self._up_since_s: float | None = -math.inf
+        self._after_s = -math.inf
+        self._dropped = transport.dropped
+        self._stop_noted = False
         self._modulator = modulator
         self._guard = guard
         self._source = source
@@ -52,23 +57,48 @@ class Runtime:
     def step(self, tick: int, now_s: float) -> None:
         """Send one command: newest base, guard, noise, limits, send; the journal and the next window come after.
 
+        While the link is down the robot is held at a standstill, and once it is back until a base command has come.
         Raises MtmError when the transport fails, after the robot was told to stop.
         """
-        guard, modulator = self._guard, self._modulator
+        guard, modulator, transport = self._guard, self._modulator, self._transport
         velocity, arrived_s, stop = self._source.poll(now_s)
-        if stop:
+        if stop and not self._stop_noted:
+            self._stop_noted = True
             guard.stop()
-        base = guard.admit(velocity, arrived_s, now_s)
+            self._note(tick, "the operator said stop")
+        if transport.up_since_s != self._up_since_s:
+            self._follow_link(tick, now_s)
+        base = guard.admit(velocity, arrived_s, now_s, after_s=self._after_s)
         wanted = base if modulator is None or not guard.noise_allowed else modulator.add(tick, base)
         sent = guard.limit(base, wanted)
         try:
-            self._transport.send(sent)
+            transport.send(sent)
         except Exception as error:
+            self._note(tick, f"the link failed: {error}")
             self._give_up(error)
+        if transport.dropped != self._dropped:
+            self._dropped = transport.dropped
+            guard.not_sent()
         if self._journal is not None:
             self._journal.append(tick, now_s, base, sent, guard.flags)
         if modulator is not None:
             modulator.prepare(tick)
+
+    def _follow_link(self, tick: int, now_s: float) -> None:
+        """The link went down or came back; of the commands that arrived up to now none moves the robot any more."""
+        before_s, since_s = self._up_since_s, self._transport.up_since_s
+        self._up_since_s = since_s
+        # A source may say of a command that it arrived now although it came before the link did.
+        self._after_s = math.inf if since_s is None else now_s
+        if before_s is not None:
+            self.transport_errors += 1
+            self._note(tick, f"the link was lost: {self._transport.fault}")
+        if since_s is not None:
+            self._note(tick, "the link is back")
+
+    def _note(self, tick: int, text: str) -> None:
+        if self._journal is not None:
+            self._journal.note(tick, text)
 
     def _give_up(self, error: Exception) -> None:
         self.transport_errors += 1

@@ -1,10 +1,16 @@
 """The seam between the runtime and a robot: one body velocity out, and always a stop at the end."""
 
+import math
 from abc import ABC, abstractmethod
 from types import TracebackType
 from typing import Self
 
 from mtm_onboard.motion import BodyVelocity
+from mtm_onboard.protocol.errors import MtmError
+
+
+class LinkBusyError(MtmError):
+    """The far end took a command not at all, or not whole, within the write bound; the link may still be sound."""
 
 
 class Transport(ABC):
@@ -14,10 +20,17 @@ class Transport(ABC):
     before anything is packed. `service` does what the link needs between commands (heartbeats, telemetry); the
     runtime calls it at least every `service_period_s`, on the robot from a thread of its own, so a subclass guards
     whole messages with a lock. `write_bound_s` is the longest that `send` may wait for the far end.
+
+    For a link that may go and come back: `up_since_s` is when it came up last on the runtime's clock (-inf for a link
+    that is up from `open` to `stop`, None while it is down), `dropped` counts commands that `send` took without an
+    error and that never left, and `fault` says why the link went down.
     """
 
     service_period_s: float = 0.010
     write_bound_s: float = 0.005
+    up_since_s: float | None = -math.inf
+    dropped: int = 0
+    fault: str = ""
 
     @abstractmethod
     def open(self) -> None:
