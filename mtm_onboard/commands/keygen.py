@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mtm_onboard.protocol import Channel
+    from mtm_onboard.protocol import Channel, Scheme
 
 _PRESETS: dict[str, dict[str, Any]] = {
     "robomaster-fleet": {
@@ -28,6 +28,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--id", required=True, help="the key's name, which journals and auditors show")
     parser.add_argument("--out", required=True, type=Path, help="the key file to write; it must not exist")
     parser.add_argument("--preset", choices=sorted(_PRESETS), help="a whole scheme; the options below override parts")
+    parser.add_argument("--scheme", type=Path, metavar="FILE", help="a scheme file, as mtm-audit plan writes it")
     parser.add_argument("--name", help="the scheme's name")
     parser.add_argument("--rate", type=float, metavar="HZ", help="control rate")
     parser.add_argument("--band", type=_band, metavar="LOW:HIGH", help="noise band in Hz, such as 0.5:5")
@@ -44,21 +45,33 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def _keygen(args: argparse.Namespace) -> int:
-    from mtm_onboard.protocol import Scheme, generate_key, save_key
+    from mtm_onboard.protocol import generate_key, save_key
+    from mtm_onboard.protocol.schemefile import load_scheme
 
     given = {name: getattr(args, name) for name in (*_REQUIRED, *_CHOSEN_BY_SCHEME)}
+    if args.scheme is None:
+        scheme = _chosen_scheme(args, given)
+    elif args.preset is not None or any(value is not None for value in given.values()):
+        args.usage_error("--scheme gives the whole scheme; leave out --preset and the options for its parts")
+    else:
+        scheme = load_scheme(args.scheme)
+    save_key(generate_key(args.id, scheme), args.out)
+    print(f"wrote key {args.id} to {args.out} (scheme {scheme.fingerprint}); keep it secret")
+    return 0
+
+
+def _chosen_scheme(args: argparse.Namespace, given: dict[str, Any]) -> "Scheme":
+    from mtm_onboard.protocol import Scheme
+
     chosen = _PRESETS.get(args.preset, {}) | {name: value for name, value in given.items() if value is not None}
     missing = [f"--{name.replace('_', '-')}" for name in _REQUIRED if name not in chosen]
     if missing:
-        args.usage_error(f"without --preset these are needed: {', '.join(missing)}")
-    scheme = Scheme(
+        args.usage_error(f"without --preset or --scheme these are needed: {', '.join(missing)}")
+    return Scheme(
         name=chosen["name"], rate_hz=chosen["rate"], band_hz=chosen["band"], alphabet_size=chosen["alphabet"],
         message_ticks=chosen["message_ticks"], channels=tuple(_channel(text) for text in chosen["channel"]),
         **{name: chosen[name] for name in _CHOSEN_BY_SCHEME if name in chosen},
     )  # fmt: skip
-    save_key(generate_key(args.id, scheme), args.out)
-    print(f"wrote key {args.id} to {args.out} (scheme {scheme.fingerprint}); keep it secret")
-    return 0
 
 
 def _band(text: str) -> tuple[float, float]:

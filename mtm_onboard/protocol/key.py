@@ -5,7 +5,7 @@ import re
 import secrets
 import stat
 import tomllib
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +14,10 @@ from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.keystream import SECRET_BYTES
 from mtm_onboard.protocol.scheme import Scheme, scheme_from_table
+from mtm_onboard.protocol.schemefile import scheme_text
 
 KEY_FORMAT = 1
 _FIELDS = {"format", "id", "secret", "scheme"}
-_SCHEME_PARAMETERS = (
-    "version", "name", "rate_hz", "band_hz", "alphabet_size", "message_ticks",
-    "combine", "pooling", "power", "schedule", "epoch",
-)  # fmt: skip
-_CHANNEL_PARAMETERS = ("name", "body", "axes", "symbols", "sigma")
 
 
 @dataclass(frozen=True)
@@ -60,15 +56,7 @@ def save_key(key: Key, path: Path) -> None:
 
 def key_text(key: Key) -> str:
     """The key file's text, secret included."""
-    lines = [f"format = {KEY_FORMAT}", f'id = "{key.id}"', f'secret = "{key.secret.hex()}"', "", "[scheme]"]
-    lines += [f"{name} = {_toml(getattr(key.scheme, name))}" for name in _SCHEME_PARAMETERS]
-    if key.scheme.framing is not None:
-        lines += ["", "[scheme.framing]"]
-        lines += [f"{name} = {_toml(value)}" for name, value in asdict(key.scheme.framing).items()]
-    for channel in key.scheme.channels:
-        lines += ["", "[[scheme.channels]]"]
-        lines += [f"{name} = {_toml(getattr(channel, name))}" for name in _CHANNEL_PARAMETERS]
-    return "\n".join(lines) + "\n"
+    return f'format = {KEY_FORMAT}\nid = "{key.id}"\nsecret = "{key.secret.hex()}"\n\n{scheme_text(key.scheme)}'
 
 
 def load_key(path: Path) -> Key:
@@ -119,13 +107,3 @@ def _read_private_toml(path: Path) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         # The parser's message may quote the line, and the line may hold the secret.
         raise MtmError(f"{path} is not valid TOML; name the file that mtm-onboard keygen wrote") from error
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return f'"{value}"'
-    if isinstance(value, tuple):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
-    return repr(value)
