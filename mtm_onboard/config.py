@@ -11,8 +11,8 @@ from mtm_onboard.guard import Limits, Staleness
 from mtm_onboard.protocol.errors import MtmError
 
 Option = str | int | float | bool
-_SECTIONS = ("robot", "transport", "link", "limits", "stale", "source", "journal")
-_OPTIONAL_SECTIONS = ("link", "stale", "journal")
+_SECTIONS = ("robot", "transport", "link", "limits", "stale", "source", "journal", "control")
+_OPTIONAL_SECTIONS = ("link", "stale", "journal", "control")
 _SOURCE_KINDS = ("udp", "stdin")
 _T = TypeVar("_T")
 
@@ -69,8 +69,18 @@ class JournalSettings:
 
 
 @dataclass(frozen=True)
+class ControlSettings:
+    """The path of the control socket, which takes another message or the operator's stop while the robot runs."""
+
+    socket: str
+
+
+@dataclass(frozen=True)
 class RobotConfig:
-    """All of it. `transport_options` are the fields of [transport] beside its kind; `journal` may be absent."""
+    """All of it. `transport_options` are the fields of [transport] beside its kind.
+
+    `journal` and `control` may be absent.
+    """
 
     robot: Robot
     transport_kind: str
@@ -80,6 +90,7 @@ class RobotConfig:
     source: SourceSettings
     journal: JournalSettings | None
     link: LinkSettings = LinkSettings()
+    control: ControlSettings | None = None
 
 
 def load_config(path: Path) -> RobotConfig:
@@ -117,6 +128,7 @@ def config_from_table(table: dict[str, Any]) -> RobotConfig:
         staleness=_section(Staleness, "stale", table.get("stale", {})),
         source=_section(SourceSettings, "source", table["source"]),
         journal=_section(JournalSettings, "journal", table["journal"]) if "journal" in table else None,
+        control=_section(ControlSettings, "control", table["control"]) if "control" in table else None,
         link=_section(LinkSettings, "link", table.get("link", {})),
     )
 

@@ -1,7 +1,14 @@
 """Messages, as the modulator plays them: the symbols of each slot."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
+
+from mtm_onboard.protocol import Key, MtmError
+from mtm_onboard.protocol.framing import Payload, check_symbols, encode_frame, frame_order, symbols_of_number
+from mtm_onboard.protocol.slots import epoch_of_slot
+
+# What an operator may ask a robot to send; a tuple is the whole message's symbols, of a scheme without framing.
+Content = Payload | tuple[int, ...]
 
 
 class Message(Protocol):
@@ -27,3 +34,65 @@ class PlainMessage:
     def symbols(self, slot: int) -> tuple[int, ...]:
         """All L of them."""
         return self.played
+
+
+class FramedMessage:
+    """A payload in a frame whose check is of the slot's epoch, in the order of the slot.
+
+    Raises MtmError when the payload is not one that the key's scheme carries.
+    """
+
+    def __init__(self, payload: Payload, key: Key, number: int = 0) -> None:
+        self.payload = payload
+        self.number = number
+        self._key = key
+        self._encoded = self._encode(key.scheme.epoch)
+
+    def symbols(self, slot: int) -> tuple[int, ...]:
+        """Permuted as the slot has it; encoded anew when the epoch is another than last time."""
+        scheme = self._key.scheme
+        epoch = scheme.epoch if scheme.schedule == "fixed" else epoch_of_slot(slot, scheme)[0]
+        encoded_for, frame = self._encoded
+        if epoch != encoded_for:
+            self._encoded = _, frame = self._encode(epoch)
+        return tuple(frame[place] for place in frame_order(scheme, slot).tolist())
+
+    def _encode(self, epoch: int) -> tuple[int, tuple[int, ...]]:
+        key = self._key
+        return epoch, encode_frame(self.payload, key.scheme, key.secret, number=self.number, epoch=epoch)
+
+
+def message_of(content: Content, key: Key, number: int = 0) -> Message:
+    """The message with that content; raises MtmError when the key's scheme does not carry it."""
+    scheme = key.scheme
+    if isinstance(content, tuple):
+        if scheme.framing is not None:
+            raise MtmError("this key's scheme frames its messages, so symbols cannot be given; give the payload")
+        return PlainMessage(check_symbols(content, scheme), number)
+    if scheme.framing is not None:
+        return FramedMessage(content, key, number)
+    if isinstance(content, bool) or not isinstance(content, int):
+        raise MtmError(
+            "this key's scheme carries plain numbers and no text or bytes; give a number, or make a key with "
+            "mtm-onboard keygen --payload"
+        )
+    return PlainMessage(symbols_of_number(content, scheme), number)
+
+
+def content_from_table(table: dict[str, Any]) -> Content:
+    """The content in a table with one field: number, text, hex (bytes) or symbols; raises MtmError for any other."""
+    if len(table) != 1:
+        raise MtmError("give exactly one content: a number, text, hex or symbols")
+    ((kind, value),) = table.items()
+    if kind == "number" and isinstance(value, int) and not isinstance(value, bool):
+        return value
+    if kind == "text" and isinstance(value, str):
+        return value
+    if kind == "hex" and isinstance(value, str):
+        try:
+            return bytes.fromhex(value)
+        except ValueError as error:
+            raise MtmError(f"{value!r} is not bytes; give two hexadecimal digits for each byte") from error
+    if kind == "symbols" and isinstance(value, list | tuple) and all(type(symbol) is int for symbol in value):
+        return tuple(value)
+    raise MtmError(f"the content {kind} cannot be {value!r}; give a number, text, hex or symbols")

@@ -10,12 +10,15 @@ from pathlib import Path
 
 from mtm_onboard.clock import Clock, SystemClock
 from mtm_onboard.config import RobotConfig, SourceSettings
+from mtm_onboard.control import Control, Session
+from mtm_onboard.controlsocket import ControlSocket
 from mtm_onboard.guard import Guard
 from mtm_onboard.journal import Journal, JournalHeader
 from mtm_onboard.loop import LoopStats, run_loop
+from mtm_onboard.message import Content, message_of
 from mtm_onboard.modulator import Modulator
-from mtm_onboard.protocol import Key, MtmError
-from mtm_onboard.protocol.framing import channel_symbols
+from mtm_onboard.protocol import Key, MtmError, Scheme
+from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.runtime import Runtime
 from mtm_onboard.service import ServiceThread
 from mtm_onboard.source import Source, StdinSource, UdpSource
@@ -25,16 +28,19 @@ from mtm_onboard.transports.reconnecting import ReconnectingTransport
 
 # Between opening the link and the message's first tick, so that the loop is running by then.
 _LEAD_S = 0.1
+# The year 2024: a clock that shows less was never set since the power came on.
+_EARLIEST_UNIX_S = 1_704_067_200.0
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What to send and when: the whole message (None: base commands alone), from `start_unix_s` (None: at once) on.
+    """What to send and when: the message (None: base commands alone), from `start_unix_s` (None: at once) on.
 
-    The run ends `duration_s` after the message's start; without `repeat` the message is sent once.
+    Under the rolling schedule it starts with the next slot. The run ends `duration_s` after the message's start;
+    without `repeat` the message is sent once.
     """
 
-    message: tuple[int, ...] | None
+    message: Content | None
     repeat: bool = True
     start_unix_s: float | None = None
     duration_s: float = math.inf
@@ -65,11 +71,15 @@ class Outcome:
 def run_session(config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callable[[], bool]) -> Outcome:
     """Drive the robot until `asked_to_end()` or the plan's end; leaving it, in whatever way, stops the robot.
 
-    Raises MtmError when the plan does not fit the key, and when the link or the journal cannot be had or the link
-    fails.
+    Raises MtmError when the plan does not fit the key, when the link, the control socket or the journal cannot be had,
+    and when the link fails.
     """
     channel, rate_hz = key.scheme.channel(config.robot.channel), key.scheme.rate_hz
-    modulator = _modulator(key, channel.name, plan)
+    rolling = key.scheme.schedule == "rolling"
+    # Before anything moves, so that whatever does not fit is found; a rolling message then gets its true slot.
+    modulator = _modulator(key, channel.name, plan, 0)
+    if rolling:
+        _check_clock(time.time())
     guard = Guard(config.limits, config.staleness, noise_sigma=channel.sigma, period_s=1 / rate_hz)
     clock, stats = SystemClock(), LoopStats()
     transport = _link(config, clock)
@@ -78,23 +88,33 @@ def run_session(config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callabl
         source = _source(config.source)
         stack.callback(source.close)
         files = stack.enter_context(ExitStack())
+        socket = None if config.control is None else files.enter_context(ControlSocket(Path(config.control.socket)))
         stack.enter_context(transport)
         service = stack.enter_context(ServiceThread(transport, clock))
         # Before the service's thread is waited for, which a wedged driver may hold.
         stack.callback(transport.stop)
         now_s, now_unix_s = clock.now(), time.time()
-        start_unix_s = now_unix_s + _LEAD_S if plan.start_unix_s is None else plan.start_unix_s
+        start_unix_s, first_slot = start_of(plan, key.scheme, now_unix_s)
+        if rolling:
+            modulator = _modulator(key, channel.name, plan, first_slot)
         start_s = now_s + start_unix_s - now_unix_s
         journal = None
         if config.journal is not None:
             header = JournalHeader(
                 fingerprint=key.scheme.fingerprint, key_id=key.id, robot=config.robot.name, channel=channel.name,
-                symbols=plan.message, repeat=plan.repeat, rate_hz=rate_hz, start_s=start_s, start_unix_s=start_unix_s,
+                symbols=None if plan.message is None else message_of(plan.message, key).symbols(first_slot),
+                repeat=plan.repeat, rate_hz=rate_hz, start_s=start_s, start_unix_s=start_unix_s,
             )  # fmt: skip
             journal = files.enter_context(
                 Journal(Path(config.journal.path), header, threaded=True, max_bytes=int(1e6 * config.journal.max_mb))
             )
         runtime = Runtime(modulator, guard, source, transport, journal)
+        if socket is not None:
+            session = Session(
+                config.robot.name, key, modulator, guard, source, transport, stats, journal,
+                lambda: math.floor((clock.now() - start_s) * rate_hz), start_unix_s, first_slot,
+            )  # fmt: skip
+            socket.serve(Control(session).answer)
 
         def ending() -> bool:
             return asked_to_end() or service.error is not None or clock.now() >= start_s + plan.duration_s
@@ -113,11 +133,31 @@ def _link(config: RobotConfig, clock: Clock) -> Transport:
     return ReconnectingTransport(make, clock, give_up_s=config.link.give_up_s) if config.link.reconnect else make()
 
 
-def _modulator(key: Key, channel_name: str, plan: Plan) -> Modulator | None:
+def start_of(plan: Plan, scheme: Scheme, now_unix_s: float) -> tuple[float, int]:
+    """When the message starts, in seconds since the Unix epoch, and in which slot (0 under the fixed schedule).
+
+    Under the rolling schedule a slot under way is left to its end, so that a restart plays no waveform again.
+    """
+    wanted_unix_s = now_unix_s + _LEAD_S if plan.start_unix_s is None else plan.start_unix_s
+    if scheme.schedule == "fixed":
+        return wanted_unix_s, 0
+    slot = next_slot(max(wanted_unix_s, now_unix_s + _LEAD_S), scheme)
+    return slot_start_unix_s(slot, scheme), slot
+
+
+def _check_clock(now_unix_s: float) -> None:
+    if now_unix_s < _EARLIEST_UNIX_S:
+        raise MtmError(
+            "this computer's clock was never set, and the rolling schedule's messages start by the time of day; "
+            "set the clock, for example by NTP"
+        )
+
+
+def _modulator(key: Key, channel_name: str, plan: Plan, first_slot: int) -> Modulator | None:
     if plan.message is None:
         return None
-    own = channel_symbols(plan.message, key.scheme)[channel_name]
-    modulator = Modulator(key.codebook(), channel_name, own, repeat=plan.repeat)
+    message = message_of(plan.message, key)
+    modulator = Modulator(key.codebook(first_slot), channel_name, message, repeat=plan.repeat)
     modulator.require_body_axes()
     return modulator
 

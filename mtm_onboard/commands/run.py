@@ -6,10 +6,8 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from mtm_onboard.protocol import Scheme
+from mtm_onboard.commands.contentoptions import add_content, content
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -19,17 +17,15 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser = subparsers.add_parser("run", help="drive the robot: base commands in, base commands and message out")
     parser.add_argument("--config", required=True, type=Path, help="the robot's configuration (TOML)")
     parser.add_argument("--key", required=True, type=Path, help="the key file")
-    message = parser.add_mutually_exclusive_group(required=True)
-    message.add_argument("--message", type=int, metavar="N", help="the message as a number")
-    message.add_argument("--symbols", type=_symbols, metavar="S,S,...", help="the whole message as symbols")
-    message.add_argument("--no-message", action="store_true", help="base commands alone, without noise")
+    add_content(parser).add_argument("--no-message", action="store_true", help="base commands alone, without noise")
     parser.add_argument("--no-repeat", action="store_true", help="send the message once, then base commands alone")
     parser.add_argument(
         "--duration", type=_seconds, default=math.inf, metavar="S", help="end this long after the message's start"
     )
     parser.add_argument(
         "--start-at", type=_seconds, metavar="T",
-        help="the message's start in seconds since the Unix epoch, the same for robots that start together (now)",
+        help="the message's start in seconds since the Unix epoch, the same for robots that start together (now); "
+        "under the rolling schedule the first slot from then on",
     )  # fmt: skip
     parser.add_argument(
         "--stdin", action="store_true", help="base commands from standard input; at its end the robot stands still"
@@ -47,21 +43,11 @@ def _run(args: argparse.Namespace) -> int:
     config, key = load_config(args.config), load_key(args.key)
     if args.stdin:
         config = replace(config, source=SourceSettings("stdin"))
-    plan = Plan(_message(args, key.scheme), not args.no_repeat, args.start_at, args.duration)
+    plan = Plan(None if args.no_message else content(args), not args.no_repeat, args.start_at, args.duration)
     with _ending_signals() as asked_to_end:
         outcome = run_session(config, key, plan, asked_to_end)
     print(outcome.summary())
     return 0
-
-
-def _message(args: argparse.Namespace, scheme: "Scheme") -> tuple[int, ...] | None:
-    from mtm_onboard.protocol.framing import check_symbols, symbols_of_number
-
-    if args.no_message:
-        return None
-    if args.symbols is not None:
-        return check_symbols(args.symbols, scheme)
-    return symbols_of_number(args.message, scheme)
 
 
 @contextmanager
@@ -79,10 +65,6 @@ def _ending_signals() -> Iterator[Callable[[], bool]]:
     finally:
         for number, handler in former.items():
             signal.signal(number, handler)
-
-
-def _symbols(text: str) -> tuple[int, ...]:
-    return tuple(int(symbol) for symbol in text.split(","))
 
 
 def _seconds(text: str) -> float:
