@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING
 
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.framing.framing import Layout
+from mtm_onboard.protocol.framing.galois import PRIMITIVE_POLYNOMIALS, parity_of
 
 if TYPE_CHECKING:
     from reedsolo import RSCodec
-
-# Primitive polynomials of GF(2 ** m), the usual ones with the fewest terms; that of m = 8 is also QR code's.
-PRIMITIVE_POLYNOMIALS = {
-    2: 0x7, 3: 0xB, 4: 0x13, 5: 0x25, 6: 0x43, 7: 0x89, 8: 0x11D, 9: 0x211, 10: 0x409, 11: 0x805, 12: 0x1053,
-    13: 0x201B, 14: 0x4443, 15: 0x8003, 16: 0x1100B,
-}  # fmt: skip
 
 # The library keeps the field's tables in variables of its module.
 _LIBRARY = threading.Lock()
@@ -25,14 +20,9 @@ _LIBRARY = threading.Lock()
 def encode_symbols(data: Sequence[int], layout: Layout) -> list[tuple[int, ...]]:
     """The channel symbols (L each) of every one of `data`, numbers of `data_bits` bits, most significant bit first.
 
-    Zero bits fill the last data symbol, parity follows (systematic, generator polynomial's roots alpha ** 0, 1, ...),
-    and zero symbols fill the message. Raises MtmError when the layout has parity and reedsolo is not installed.
+    Zero bits fill the last data symbol, parity follows (systematic, see `galois`), and zero symbols fill the message.
     """
-    if not layout.parity:
-        return [_channel_symbols(_digits(value, layout), layout) for value in data]
-    with _LIBRARY:
-        codec = _codec(layout)
-        return [_channel_symbols(list(codec.encode(_digits(value, layout))), layout) for value in data]
+    return [_channel_symbols(_codeword(_digits(value, layout), layout), layout) for value in data]
 
 
 def decode_symbols(symbols: Sequence[int | None], layout: Layout) -> int:
@@ -62,6 +52,10 @@ def decode_symbols(symbols: Sequence[int | None], layout: Layout) -> int:
     return data >> padding
 
 
+def _codeword(words: list[int], layout: Layout) -> list[int]:
+    return [*words, *parity_of(words, layout.parity, layout.field_bits)] if layout.parity else words
+
+
 def _corrected(received: list[int], missing: list[int], layout: Layout) -> list[int]:
     with _LIBRARY:
         codec = _codec(layout)
@@ -81,7 +75,7 @@ def _codec(layout: Layout) -> RSCodec:
         from reedsolo import RSCodec
     except ImportError as error:
         raise MtmError(
-            "this scheme's Reed-Solomon code needs the package reedsolo; install it with: pip install 'mtm[rs]'"
+            "correcting a Reed-Solomon code needs the package reedsolo; install it with: pip install 'mtm[rs]'"
         ) from error
     # Made anew each time: its kind of array too is the module's, and follows the codec that was made last.
     return RSCodec(

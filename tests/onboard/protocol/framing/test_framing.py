@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from mtm_onboard.protocol import Key, MtmError, load_key, save_key
 from mtm_onboard.protocol.framing import Framing
-from mtm_onboard.protocol.framing.code import PRIMITIVE_POLYNOMIALS
 from mtm_onboard.protocol.framing.framing import Layout, layout_of
+from mtm_onboard.protocol.framing.galois import PRIMITIVE_POLYNOMIALS
 from mtm_onboard.protocol.key import key_text
 from tests.onboard.protocol.framing.framed import FAKE_SECRET, framed_scheme, framings
 
