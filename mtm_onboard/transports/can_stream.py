@@ -1,16 +1,20 @@
 """DJI's messages over a CAN bus, where each CAN id is one stream of bytes."""
 
 import select
+import time
 from typing import TYPE_CHECKING, Protocol
 
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.transports.base import LinkBusyError
 from mtm_onboard.transports.duml import Message, Parser, encode, segment
 
 if TYPE_CHECKING:
     import can
 
 # Above a busy host's own stalls, which pyserial takes for a line that is full, and below the robot's deadman.
-_SEND_TIMEOUT_S = 0.1
+_WRITE_WITHIN_S = 0.1
+# A timeout of zero would have pyserial write a part of a frame and say nothing.
+_SHORTEST_TIMEOUT_S = 0.001
 _MOST_FRAMES_A_READ = 512  # so that a babbling bus cannot hold its reader for ever
 
 
@@ -49,14 +53,21 @@ class CanStream:
         self._errors = (can.CanError, OSError, ValueError)  # ValueError: the descriptor of a closed bus
         self._descriptor = _descriptor(bus)
 
-    def write(self, message: Message) -> None:
-        """Put one message on the bus; raises MtmError when the bus refuses a frame of it."""
-        parts = segment(encode(message))
+    def write(self, message: Message, within_s: float = _WRITE_WITHIN_S) -> None:
+        """Put one message on the bus, in `within_s` seconds at most.
+
+        Raises LinkBusyError when the bus did not take all of it in time and MtmError when it refuses a frame.
+        """
+        deadline_s = time.monotonic() + within_s
         try:
-            for data in parts:
+            for data in segment(encode(message)):
                 frame = self._frame(arbitration_id=self._send_id, is_extended_id=False, data=data)
-                self._bus.send(frame, timeout=_SEND_TIMEOUT_S)
+                self._bus.send(frame, timeout=max(_SHORTEST_TIMEOUT_S, deadline_s - time.monotonic()))
         except self._errors as error:
+            if time.monotonic() >= deadline_s:
+                raise LinkBusyError(
+                    f"The CAN bus took no frame in time ({error}); check the wiring and that the robot is on."
+                ) from error
             raise MtmError(f"The CAN bus refused a frame ({error}); check the wiring and the robot's power.") from error
 
     def read(self) -> list[Message]:

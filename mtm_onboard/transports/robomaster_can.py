@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
-from mtm_onboard.transports.base import Transport
+from mtm_onboard.transports.base import LinkBusyError, Transport
 from mtm_onboard.transports.can_stream import Bus, CanStream
 from mtm_onboard.transports.duml import ACK, Message
 from mtm_onboard.transports.robomaster_messages import (
@@ -42,6 +42,7 @@ from mtm_onboard.transports.robomaster_telemetry import (
 SUBSCRIPTION: Final = Subscription(stream=0, topics=(VELOCITY, ATTITUDE, POSITION), rate_hz=50)
 
 _NODE_KNOWN = b"\x50"
+_OPEN_WITHIN_S = 0.1
 _STOP_TRIES = 5
 _STOP_PAUSE_S = 0.005
 # A beat that is due within this part of a period counts as due: instants are sums of decimal fractions.
@@ -60,6 +61,8 @@ class RoboMasterCan(Transport):
     """
 
     service_period_s = HEARTBEAT_PERIOD_S
+    # A control period: above most of a host's own stalls, which pyserial takes for a line that is full.
+    write_bound_s = 0.02
 
     def __init__(self, bus: Bus | None = None, **bus_options: Any) -> None:
         if (bus is None) == (not bus_options):
@@ -111,9 +114,10 @@ class RoboMasterCan(Transport):
     def send(self, velocity: BodyVelocity) -> None:
         """Send one speed command.
 
-        Raises ValueError for values that are not finite and MtmError when the bus fails or the link is not open.
+        Raises ValueError for values that are not finite, LinkBusyError when the bus takes it too slowly, and MtmError
+        when the bus fails or the link is not open.
         """
-        self._command(SPEED, speed_payload(velocity))
+        self._command(SPEED, speed_payload(velocity), self.write_bound_s)
 
     def stop(self) -> None:
         """Send zero speed and work mode off, each several times if the bus reports an error.
@@ -166,24 +170,34 @@ class RoboMasterCan(Transport):
         except ImportError:
             raise MtmError("python-can is not installed; install mtm[can] to reach a robot over CAN.") from None
         try:
-            return can.Bus(**{"bitrate": BITRATE, **self._bus_options})
+            bus = can.Bus(**{"bitrate": BITRATE, **self._bus_options})
         except (can.CanError, OSError, ValueError, TypeError) as error:
             raise MtmError(f"The CAN bus cannot be opened ({error}); check the interface and the channel.") from error
+        serial_port = getattr(bus, "serialPortOrig", None)
+        if serial_port is not None:
+            # After each frame python-can would wait, without bound, until the last byte has left a serial adapter.
+            serial_port.flush = lambda: None
+        return bus
 
-    def _command(self, kind: Kind, payload: bytes) -> None:
-        with self._lock:
+    def _command(self, kind: Kind, payload: bytes, within_s: float = _OPEN_WITHIN_S) -> None:
+        deadline_s = time.monotonic() + within_s
+        if not self._lock.acquire(timeout=within_s):
+            raise LinkBusyError("The CAN bus is still busy with the message before; check that the robot is on.")
+        try:
             if self._stream is None or not self._engaged:
                 raise MtmError("The link to the robot is not open, or was stopped; open it before sending.")
             try:
-                self._stream.write(kind.message(self._sequence.next(kind), payload))
+                self._stream.write(kind.message(self._sequence.next(kind), payload), deadline_s - time.monotonic())
             except MtmError:
                 self.bus_errors += 1
                 raise
+        finally:
+            self._lock.release()
 
     def _attempt(self, stream: CanStream, kind: Kind, payload: bytes) -> bool:
         """Send one message with the lock held; a bus error is counted and gives False."""
         try:
-            stream.write(kind.message(self._sequence.next(kind), payload))
+            stream.write(kind.message(self._sequence.next(kind), payload), self.write_bound_s)
         except MtmError:
             self.bus_errors += 1
             return False

@@ -6,6 +6,7 @@ import pytest
 
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.transports.base import LinkBusyError
 from mtm_onboard.transports.duml import Parser, encode, segment
 from mtm_onboard.transports.robomaster_can import RoboMasterCan
 from mtm_onboard.transports.robomaster_messages import WORK_MODE
@@ -172,6 +173,51 @@ def test_a_bus_error_in_a_heartbeat_is_counted_and_does_not_end_the_service():
     assert (transport.bus_errors, transport.heartbeats) == (1, 1)
 
 
+class SlowBus(BrokenBus):
+    """Takes each frame only after its whole timeout, or not even then when it is `full`."""
+
+    def __init__(self, *, full):
+        super().__init__(())
+        self.is_slow = False
+        self._full = full
+        self.now_s = 0.0
+
+    def send(self, msg, timeout=None):
+        if not self.is_slow:
+            return super().send(msg, timeout)
+        self.now_s += timeout
+        if self._full:
+            raise can.CanOperationError("Could not write to serial device")
+        return super().send(msg, timeout)
+
+
+@pytest.mark.parametrize("full", [True, False])
+def test_a_slow_bus_holds_a_command_up_for_no_longer_than_the_write_bound(monkeypatch, full):
+    bus = SlowBus(full=full)
+    monkeypatch.setattr("mtm_onboard.transports.can_stream.time.monotonic", lambda: bus.now_s)
+    transport = RoboMasterCan(bus)
+    transport.open()
+    bus.is_slow = True
+    if full:
+        with pytest.raises(LinkBusyError, match="no frame in time"):
+            transport.send(FORWARD)
+        assert bus.now_s == pytest.approx(transport.write_bound_s)
+    else:
+        transport.send(FORWARD)
+        # Each of four frames may wait a millisecond even when there is no time left, so that none is cut in two.
+        assert bus.now_s <= transport.write_bound_s + 0.004
+    bus.is_slow = False
+    transport.send(FORWARD)
+
+
+def test_a_command_does_not_wait_longer_for_a_heartbeat_that_is_stuck():
+    transport = RoboMasterCan(BrokenBus(()))
+    transport.open()
+    with vars(transport)["_lock"], pytest.raises(LinkBusyError, match="still busy"):
+        transport.send(FORWARD)
+    transport.send(FORWARD)
+
+
 def test_a_service_after_close_does_nothing():
     bus = BrokenBus(())
     transport = RoboMasterCan(bus)
@@ -203,6 +249,7 @@ def test_a_link_needs_either_a_bus_or_its_options(arguments):
 
 def test_commands_and_heartbeats_from_two_threads_never_mix_their_frames():
     with can_rig() as rig, rig.transport:
+        rig.transport.write_bound_s = 10.0  # a beating thread that never pauses leaves the lock to chance
         beating = threading.Thread(target=lambda: [rig.transport.service(0.01 * beat) for beat in range(300)])
         beating.start()
         for _ in range(300):
