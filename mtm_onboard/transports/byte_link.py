@@ -62,6 +62,8 @@ class ByteLink:
                 if self._is_closed or not select.select([self._descriptor], (), (), 0)[0]:
                     break
                 part = os.read(self._descriptor, _READ_BYTES)
+                if not part and data:
+                    break  # said next time, so that the robot's last words are heard
                 if not part:
                     raise MtmError("The robot has closed the link; check its power and the cable.")
                 data += part
