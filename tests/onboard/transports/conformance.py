@@ -43,6 +43,10 @@ class Rig:
 
 
 class TransportConformance:
+    # Two velocities that the robot can have and that have little in common; others may be set for a robot's sake.
+    askew = BodyVelocity(0.5, 0.2, 0.3)
+    other = BodyVelocity(0.0, 0.5, 0.0)
+
     @pytest.fixture
     def rig(self):
         """A `Rig` whose robot has no deadman, so that only the transport can stop it."""
@@ -76,7 +80,7 @@ class TransportConformance:
 
     def test_leaving_stops_the_robot(self, rig):
         with rig.transport:
-            rig.drive(BodyVelocity(0.5, 0.2, 0.3))
+            rig.drive(self.askew)
             assert rig.plant.velocity_body != STOP
         rig.settle()
         assert rig.plant.velocity_body == STOP
@@ -146,5 +150,5 @@ class TransportConformance:
             rig.transport.open()
             rig.settle()
             assert rig.plant.velocity_body == STOP
-            rig.drive(BodyVelocity(0.0, 0.5, 0.0))
-            assert rig.plant.velocity_body == BodyVelocity(0.0, 0.5, 0.0)
+            rig.drive(self.other)
+            assert rig.plant.velocity_body == self.other
