@@ -2,48 +2,74 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from mtm_audit.tracks import Track
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Scheme
 
+# Each pair is read as a channel of its own, decoys included; a film of fourteen robots without names comes to this.
+MOST_PAIRS = 200
 
-def assign_tracks(
-    scheme: Scheme, tracks: Sequence[Track], chosen: Mapping[str, str] | None = None
-) -> dict[str, Track | None]:
-    """For each body of the scheme its track, or None when nothing shows it.
+
+@dataclass(frozen=True)
+class Assignment:
+    """`settled` bodies with the track that shows each; `unsettled` bodies, to be searched among the `free` tracks."""
+
+    settled: Mapping[str, Track]
+    unsettled: tuple[str, ...]
+    free: tuple[Track, ...]
+
+
+def assign_tracks(scheme: Scheme, tracks: Sequence[Track], chosen: Mapping[str, str] | None = None) -> Assignment:
+    """What choice, names and numbers say about which track shows which body of the scheme.
 
     `chosen` maps bodies to track names and comes first. Then equal names count, then equal trailing numbers (body
     robot2, marker2), and last a single body with a single track. No track is given to two bodies. Raises MtmError
-    when a chosen name does not exist or is chosen twice, or when no body has a track.
+    when a chosen name does not exist or is chosen twice, when there is no track, or when so much is left open that
+    `MOST_PAIRS` would not suffice to search it.
     """
     bodies = list(dict.fromkeys(channel.body for channel in scheme.channels))
-    by_name = {track.name: track for track in tracks}
-    found: dict[str, Track | None] = dict.fromkeys(bodies)
-    free = dict(by_name)
-    for body, name in (chosen or {}).items():
-        if body not in found:
+    free = {track.name: track for track in tracks}
+    if not free:
+        raise MtmError(f"the recording has no track that could show {', '.join(bodies)}; record them in sight")
+    settled = _chosen(bodies, free, chosen or {})
+    for body in bodies:
+        if body not in settled and body in free:
+            settled[body] = free.pop(body)
+    for body in bodies:
+        number_match = None if body in settled else _same_number(body, list(free.values()))
+        if number_match is not None:
+            settled[body] = free.pop(number_match.name)
+    if len(bodies) == len(tracks) == 1 and free and not settled:
+        settled[bodies[0]] = free.pop(tracks[0].name)
+    unsettled = tuple(body for body in bodies if body not in settled)
+    _check_pairs(scheme, unsettled, len(free))
+    return Assignment(settled, unsettled, tuple(free.values()))
+
+
+def _chosen(bodies: Sequence[str], free: dict[str, Track], chosen: Mapping[str, str]) -> dict[str, Track]:
+    """The pairs chosen by hand; their tracks leave `free`."""
+    settled: dict[str, Track] = {}
+    names = sorted(free)
+    for body, name in chosen.items():
+        if body not in bodies:
             raise MtmError(f"the scheme has no body {body!r}; its bodies are: {', '.join(bodies)}")
-        if name not in by_name:
-            raise MtmError(f"the recording has no track {name!r}; it has: {', '.join(sorted(by_name))}")
+        if name not in names:
+            raise MtmError(f"the recording has no track {name!r}; it has: {', '.join(names)}")
         if name not in free:
             raise MtmError(f"track {name!r} is given to two bodies; give each its own")
-        found[body] = free.pop(name)
-    for body in bodies:
-        if found[body] is None and body in free:
-            found[body] = free.pop(body)
-    for body in bodies:
-        number_match = _same_number(body, list(free.values())) if found[body] is None else None
-        if number_match is not None:
-            found[body] = free.pop(number_match.name)
-    if len(bodies) == len(tracks) == 1 and found[bodies[0]] is None:
-        found[bodies[0]] = tracks[0]
-    if all(track is None for track in found.values()):
+        settled[body] = free.pop(name)
+    return settled
+
+
+def _check_pairs(scheme: Scheme, unsettled: Sequence[str], free: int) -> None:
+    pairs = free * sum(channel.body in unsettled for channel in scheme.channels)
+    if pairs > MOST_PAIRS:
         raise MtmError(
-            f"no track belongs to a body of the scheme: the recording has {', '.join(sorted(by_name)) or 'none'}, the "
-            f"scheme has {', '.join(bodies)}; name the pairs with --assign BODY=TRACK"
+            f"{len(unsettled)} bodies and {free} tracks are left to match by search, {pairs} pairs, and no more than "
+            f"{MOST_PAIRS} can be searched; name pairs with --assign BODY=TRACK, or leave tracks out"
         )
-    return found
 
 
 def _same_number(body: str, tracks: Sequence[Track]) -> Track | None:

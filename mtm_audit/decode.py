@@ -1,28 +1,25 @@
-"""From tracks to a verdict: assignment, glimpses, readings under the key and its decoys, symbols, message."""
+"""From tracks to a verdict: assignment, readings under the key and its decoys, symbols, message."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
 from mtm_audit.assignment import assign_tracks
 from mtm_audit.detectors import make_detector
-from mtm_audit.detectors.base import ChannelReading, Observation, Reading
+from mtm_audit.detectors.base import Reading
 from mtm_audit.detectors.matched.profile import PlantProfile
-from mtm_audit.glimpse import Glimpse, glimpse_of_track
+from mtm_audit.glimpse import Glimpse
 from mtm_audit.order import order_is_known
+from mtm_audit.readings import Progress, Readings, read_tracks
 from mtm_audit.tracks import Floats, Track
-from mtm_audit.verdict import Evidence, VerdictName, decoy_codebooks
-from mtm_onboard.protocol.errors import MtmError
+from mtm_audit.verdict import Evidence, VerdictName
 from mtm_onboard.protocol.framing import number_of_symbols
 from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.scheme import Channel, Scheme
 
 # A symbol is certain when its posterior probability is at least this.
 CERTAIN = 0.95
-# The onset search takes about a kilobyte a tick; at 50 Hz this is 2.8 h.
-_MOST_TICKS = 500_000
 
 
 @dataclass(frozen=True)
@@ -45,13 +42,14 @@ class ChannelDecoding:
     """What one channel's motion said; `glimpse` and `reading` are None when no track shows its body.
 
     `posteriors` (positions, M): probability of each symbol at each of the channel's positions, given that a message
-    is there.
+    is there. `searched` when the track was found by search, not by name, number or choice.
     """
 
     channel: Channel
     glimpse: Glimpse | None
     reading: Reading | None
     posteriors: Floats
+    searched: bool = False
 
     @property
     def onset_s(self) -> float | None:
@@ -83,6 +81,11 @@ class Decoding:
     settings: DecodeSettings
 
     @property
+    def evidence_bits(self) -> float:
+        """The evidence of all channels together, see `Evidence.bits`."""
+        return self.evidence.bits(sum(decoding.reading is not None for decoding in self.channels))
+
+    @property
     def uncertain(self) -> tuple[int, ...]:
         """Message positions whose symbol is missing or less than `CERTAIN`."""
         return tuple(
@@ -93,51 +96,18 @@ class Decoding:
 
 
 def decode_tracks(
-    tracks: Sequence[Track], key: Key, settings: DecodeSettings, progress: Callable[[str, float], None] | None = None
+    tracks: Sequence[Track], key: Key, settings: DecodeSettings, progress: Progress | None = None
 ) -> Decoding:
     """Decode a message from tracks under a key.
 
     `progress(stage, fraction)` is called now and then. Raises MtmError when no channel can be read at all.
     """
-    scheme = key.scheme
     detector = make_detector(settings.detector, settings.profile)
-    bodies = assign_tracks(scheme, tracks, settings.assignment)
-    glimpses = {body: _glimpse(track, scheme.rate_hz) for body, track in bodies.items() if track is not None}
-    observations = [
-        Observation(channel, glimpses[channel.body]) for channel in scheme.channels if channel.body in glimpses
-    ]
-    decoys = decoy_codebooks(key, settings.decoys)
-    report = None if progress is None else partial(progress, "reading")
-    results = detector.read(key.codebook(), decoys, observations, settings.onset_s, report)
-    read = {
-        observation.channel.name: result
-        for observation, result in zip(observations, results, strict=True)
-        if not isinstance(result, MtmError)
-    }
-    if not read:
-        raise next(result for result in results if isinstance(result, MtmError))
-    channels = [
-        _channel_decoding(channel, glimpses.get(channel.body), read.get(channel.name), scheme)
-        for channel in scheme.channels
-    ]
-    evidence = detector.weigh(
-        float(np.mean([result.reading.strength for result in read.values()])),
-        np.mean([result.decoy_strengths for result in read.values()], axis=0),
-        sum(result.reading.maxima for result in read.values()),
-    )
-    posteriors, symbols = _message_symbols(scheme, channels)
-    return _decoding(key, settings, tuple(channels), symbols, posteriors, evidence)
-
-
-def _glimpse(track: Track, rate_hz: float) -> Glimpse:
-    glimpse = glimpse_of_track(track)
-    lasts_s, most_s = float(glimpse.edges_s[-1] - glimpse.edges_s[0]), _MOST_TICKS / rate_hz
-    if not lasts_s <= most_s:
-        raise MtmError(
-            f"the recording of {track.name!r} lasts {lasts_s:g} s, and no more than {most_s:g} s can be searched; "
-            "cut out the part with the message, and check that the times are seconds"
-        )
-    return glimpse
+    assignment = assign_tracks(key.scheme, tracks, settings.assignment)
+    readings = read_tracks(assignment, key, detector, settings.decoys, settings.onset_s, progress)
+    channels = tuple(_channel_decoding(channel, readings, key.scheme) for channel in key.scheme.channels)
+    posteriors, symbols = _message_symbols(key.scheme, channels)
+    return _decoding(key, settings, channels, symbols, posteriors, readings.evidence)
 
 
 def _decoding(
@@ -168,13 +138,13 @@ def _decoding(
     return undecided if message is None else answer("decoded", message)
 
 
-def _channel_decoding(
-    channel: Channel, glimpse: Glimpse | None, result: ChannelReading | None, scheme: Scheme
-) -> ChannelDecoding:
+def _channel_decoding(channel: Channel, readings: Readings, scheme: Scheme) -> ChannelDecoding:
+    glimpse, result = readings.glimpses.get(channel.body), readings.channels.get(channel.name)
+    searched = channel.body in readings.searched
     if result is None:
         unknown = np.full((channel.symbols, scheme.alphabet_size), 1.0 / scheme.alphabet_size)
-        return ChannelDecoding(channel, glimpse, None, unknown)
-    return ChannelDecoding(channel, glimpse, result.reading, result.posteriors)
+        return ChannelDecoding(channel, glimpse, None, unknown, searched)
+    return ChannelDecoding(channel, glimpse, result.reading, result.posteriors, searched)
 
 
 def _message_symbols(scheme: Scheme, channels: Sequence[ChannelDecoding]) -> tuple[Floats, tuple[int | None, ...]]:

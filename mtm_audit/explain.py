@@ -7,9 +7,9 @@ import numpy as np
 
 from mtm_audit.assignment import assign_tracks
 from mtm_audit.decode import CERTAIN, ChannelDecoding, DecodeSettings, Decoding
-from mtm_audit.glimpse import glimpse_of_track
+from mtm_audit.readings import usable_glimpses
 from mtm_audit.recordings.recording import Recording
-from mtm_audit.report import chance_sentence, percent, recording_line, verdict_sentence
+from mtm_audit.report import chance_sentence, evidence_sentence, percent, recording_line, verdict_sentence
 from mtm_audit.tracks import Track
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.framing import payload_bits
@@ -61,16 +61,12 @@ def stages_of_recording(recording: Recording) -> list[Stage]:
 def failed_stage(tracks: Sequence[Track], scheme: Scheme, settings: DecodeSettings) -> str:
     """At which stage a decode of these tracks was refused."""
     try:
-        bodies = assign_tracks(scheme, tracks, settings.assignment)
+        assignment = assign_tracks(scheme, tracks, settings.assignment)
     except MtmError:
         return "tracks"
-    try:
-        for track in bodies.values():
-            if track is not None:
-                glimpse_of_track(track)
-    except MtmError:
-        return "glimpse"
-    return "timing"
+    settled, refusals = usable_glimpses(assignment.settled.values(), scheme.rate_hz)
+    searched, _ = usable_glimpses(assignment.free, scheme.rate_hz)
+    return "timing" if not refusals and (settled or searched) else "glimpse"
 
 
 def stages_of_decoding(decoding: Decoding) -> list[Stage]:
@@ -103,8 +99,9 @@ def _glimpse_line(channel: ChannelDecoding) -> str:
         return f"{channel.channel.name}: no track shows {channel.channel.body}"
     gaps, durations_s = int(np.sum(~glimpse.valid)), glimpse.durations_s
     missed_s = float(durations_s[~glimpse.valid].sum())
+    found = ", found by search" if channel.searched else ""
     return (
-        f"{channel.channel.name} from track {glimpse.name}: {len(durations_s)} intervals of "
+        f"{channel.channel.name} from track {glimpse.name}{found}: {len(durations_s)} intervals of "
         f"{1000.0 * float(np.median(durations_s)):.1f} ms, {gaps} gaps, {missed_s:.2f} s"
     )
 
@@ -136,6 +133,7 @@ def _detector_lines(decoding: Decoding) -> tuple[str, ...]:
         f"{decoding.settings.detector}: strength {decoding.evidence.strength:.4f}; {len(decoys)} decoy keys "
         f"{float(decoys.mean()):.4f} ± {float(decoys.std(ddof=1)):.4f}"
     )
+    lines.append(evidence_sentence(decoding))
     return tuple(lines)
 
 

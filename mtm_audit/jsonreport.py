@@ -26,6 +26,7 @@ def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, .
         "p_value": evidence.p_value,
         "threshold": decoding.settings.threshold,
         "strength": evidence.strength,
+        "evidence_bits": decoding.evidence_bits,
         "decoys": {
             "count": len(evidence.decoy_strengths),
             "mean": float(np.mean(evidence.decoy_strengths)),
@@ -66,6 +67,7 @@ def _channel(decoding: ChannelDecoding) -> dict[str, Any]:
         "name": channel.name,
         "body": channel.body,
         "track": None if glimpse is None else glimpse.name,
+        "track_searched": decoding.searched,
         "onset_s": decoding.onset_s,
         "rate_hz": None if reading is None else reading.timing.rate_hz,
         "windows": 0 if reading is None else len(reading.window_positions),

@@ -46,6 +46,24 @@ def chance_sentence(decoding: Decoding) -> str:
     )
 
 
+def evidence_sentence(decoding: Decoding) -> str:
+    """The evidence in bits, and what that means."""
+    meaning = "log-likelihood ratio of the best message against none" if decoding.evidence.in_nats else "-log2 p"
+    return f"{decoding.evidence_bits:.1f} bits of evidence for a message of this key ({meaning})"
+
+
+def search_sentence(recording: Recording, decoding: Decoding) -> str | None:
+    """Which tracks were matched by search; None when all were named. Without a message the pairs are chance."""
+    found = {item.channel.body: item.glimpse.name for item in decoding.channels if item.searched and item.glimpse}
+    if not found:
+        return None
+    among = f"among {len(recording.tracks)} tracks, as were those of the decoy keys"
+    if decoding.verdict == "absent":
+        return f"Which track shows {', '.join(found)} was searched {among}; without a message the pairs are chance."
+    pairs = ", ".join(f"{body} is {track}" for body, track in found.items())
+    return f"Tracks matched by search {among}: {pairs}."
+
+
 def rarity(probability: float) -> str:
     """A probability as "43 in 100", "1 in 2,500" or "1 in 3e14"."""
     if probability >= 0.01:
@@ -61,11 +79,16 @@ def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str]) -
     parts: list[RenderableType] = [
         Text(verdict_sentence(decoding), style=_COLOURS[decoding.verdict]),
         Text(chance_sentence(decoding)),
-        *(Text(sentence) for sentence in advice(recording, decoding)),
+        *(
+            Text(sentence)
+            for sentence in (search_sentence(recording, decoding), *advice(recording, decoding))
+            if sentence
+        ),
         Text(""),
         Text(f"key        {decoding.key_id}"),
         Text(f"scheme     {scheme.name} (fingerprint {scheme.fingerprint})"),
         Text(f"recording  {recording_line(recording)}"),
+        Text(f"evidence   {evidence_sentence(decoding)}"),
         Text(""),
         _absent_table(decoding) if decoding.verdict == "absent" else _symbol_table(decoding),
     ]

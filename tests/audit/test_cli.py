@@ -121,6 +121,34 @@ def test_json_fits_the_schema_whatever_the_verdict(audit, folder):
         assert answer["recording"]["frames"] == 1001
 
 
+def test_tracks_without_names_are_matched_and_that_is_said(audit, folder, tmp_path):
+    for source, name in (("robot0", "left"), ("robot1", "right")):
+        (tmp_path / f"{name}.tum").write_bytes((folder / f"sent/{source}.tum").read_bytes())
+    code, out, _ = audit(tmp_path, *QUICK)
+    assert (code, out.splitlines()[0]) == (0, "decoded: message 13 (0b1101)")
+    assert "Tracks matched by search among 2 tracks" in out
+    assert "robot0 is left, robot1 is right" in out
+    _, out, _ = audit(tmp_path, *QUICK, "--explain")
+    assert "robot0 from track left, found by search" in out
+    _, out, _ = audit(tmp_path, *QUICK, "--json")
+    assert [(item["track"], item["track_searched"]) for item in json.loads(out)["channels"]] == [
+        ("left", True), ("right", True)
+    ]  # fmt: skip
+    jsonschema.validate(json.loads(out), SCHEMA)
+    code, out, _ = audit(tmp_path, *QUICK, key="other.key")
+    assert code == 3
+    assert "without a message the pairs are chance" in out
+    assert "robot0 is" not in out
+
+
+def test_evidence_is_said_in_bits(audit, folder):
+    _, out, _ = audit(folder / "sent", *QUICK)
+    _, text, _ = audit(folder / "sent", *QUICK, "--json")
+    bits = json.loads(text)["evidence_bits"]
+    assert bits > 13.0
+    assert f"evidence   {bits:.1f} bits of evidence for a message of this key (-log2 p)" in out
+
+
 def test_the_schema_is_one_and_would_notice(audit, folder):
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     answer = json.loads(audit(folder / "sent", *QUICK, "--json")[1])

@@ -184,6 +184,89 @@ def test_tracks_can_be_assigned_by_hand():
     assert decode_tracks(crossed, PAIR, settings).message == 13
 
 
+FLEET = key_of(scheme_of(symbols=(1, 1, 1), ticks=400))
+
+
+@cache
+def strangers(order=(2, 0, 1), seconds=10.0):
+    """A fleet that sends 3 1 2, in tracks whose names say nothing; `order` is which robot each track shows."""
+    sent = (3, 1, 2)
+    shown = [robot_track(FLEET, f"robot{n}", (sent[n],), seconds, onset_s=1.0, seed=n) for n in order]
+    return tuple(replace(track, name=f"thing {letter}") for track, letter in zip(shown, "abc", strict=False))
+
+
+def found_by_body(decoding):
+    return {item.channel.body: item.glimpse and item.glimpse.name for item in decoding.channels}
+
+
+@pytest.mark.parametrize("onset_s", [1.0, None])
+def test_tracks_whose_names_say_nothing_are_matched_by_search(onset_s):
+    decoding = decode_tracks(strangers(), FLEET, DecodeSettings(onset_s=onset_s, decoys=20))
+    assert (decoding.verdict, decoding.symbols) == ("decoded", (3, 1, 2))
+    assert found_by_body(decoding) == {"robot0": "thing b", "robot1": "thing c", "robot2": "thing a"}
+    assert all(item.searched for item in decoding.channels)
+
+
+def test_the_matched_detector_finds_each_body_s_track_too():
+    key = key_of(scheme_of(symbols=(1, 1), ticks=200))
+    shown = [robot_track(key, f"robot{n}", (SENT[n],), 5.0, onset_s=0.5, seed=n) for n in (1, 0)]
+    crossed = [replace(track, name=name) for track, name in zip(shown, ("left", "right"), strict=True)]
+    decoding = decode_tracks(crossed, key, DecodeSettings("matched", 0.5, decoys=8, threshold=0.05))
+    assert (decoding.verdict, decoding.symbols) == ("decoded", SENT)
+    assert found_by_body(decoding) == {"robot0": "right", "robot1": "left"}
+
+
+@pytest.mark.parametrize("onset_s", [1.0, None])
+def test_the_wrong_key_finds_nothing_however_tracks_are_matched(onset_s):
+    wrong = key_of(FLEET.scheme, OTHER_SECRET)
+    decoding = decode_tracks(strangers(), wrong, DecodeSettings(onset_s=onset_s, decoys=20))
+    assert (decoding.verdict, decoding.message) == ("absent", None)
+    assert decoding.evidence.p_value > 0.01
+
+
+def test_tracks_of_others_are_left_out_of_the_search_for_bodies():
+    silent = [replace(robot_track(FLEET, "robot0", None, 10.0, seed=3), name="passer-by")]
+    silent += [Track("dot", np.arange(4.0), np.zeros((4, 2)), np.array([True, False, False, False]))]
+    decoding = decode_tracks([*silent, *strangers()], FLEET, KNOWN)
+    assert (decoding.verdict, decoding.symbols) == ("decoded", (3, 1, 2))
+
+
+def test_a_body_for_which_no_track_is_left_stays_unseen():
+    decoding = decode_tracks(strangers(order=(2, 1)), FLEET, KNOWN)
+    assert found_by_body(decoding) == {"robot0": None, "robot1": "thing b", "robot2": "thing a"}
+    assert (decoding.verdict, decoding.symbols) == ("inconclusive", (None, 1, 2))
+
+
+def test_named_tracks_are_settled_before_the_search():
+    named = replace(strangers()[1], name="robot0")
+    decoding = decode_tracks([strangers()[0], named, strangers()[2]], FLEET, KNOWN)
+    assert decoding.verdict == "decoded"
+    assert found_by_body(decoding) == {"robot0": "robot0", "robot1": "thing c", "robot2": "thing a"}
+    assert [item.searched for item in decoding.channels] == [False, True, True]
+
+
+def test_the_strength_is_the_mean_of_the_channels_whichever_tracks_were_searched():
+    for tracks in (strangers(), (*strangers()[:2], replace(strangers()[2], name="robot1"))):
+        decoding = decode_tracks(tracks, FLEET, replace(KNOWN, decoys=8))
+        shown = [item.reading.strength for item in decoding.channels if item.reading is not None]
+        assert decoding.evidence.strength == pytest.approx(np.mean(shown))
+
+
+def test_tracks_too_short_to_match_are_refused_in_a_sentence():
+    with pytest.raises(MtmError, match="no whole window"):
+        decode_tracks(strangers(seconds=4.0), FLEET, KNOWN)
+    with pytest.raises(MtmError, match="at least 3"):
+        decode_tracks([Track("dot", np.zeros(1), np.zeros((1, 2)), np.ones(1, bool))], PAIR, KNOWN)
+
+
+def test_evidence_in_bits_is_what_the_p_value_says_unless_it_is_a_log_evidence():
+    by_coherency = decode_tracks(pair(), PAIR, KNOWN)
+    assert by_coherency.evidence_bits == pytest.approx(-np.log2(by_coherency.evidence.p_value))
+    by_likelihood = decode_tracks(pair(), PAIR, replace(KNOWN, detector="matched", decoys=8))
+    nats = sum(item.reading.strength for item in by_likelihood.channels if item.reading is not None)
+    assert by_likelihood.evidence_bits == pytest.approx(nats / np.log(2.0))
+
+
 def test_progress_is_told():
     told = []
     decode_tracks(pair(), PAIR, replace(KNOWN, decoys=8), lambda stage, fraction: told.append((stage, fraction)))
