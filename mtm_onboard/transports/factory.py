@@ -9,6 +9,7 @@ from mtm_onboard.transports.base import Transport
 _KINDS = {
     "none": ("mtm_onboard.transports.none", "NullTransport"),
     "robomaster-can": ("mtm_onboard.transports.robomaster_can", "RoboMasterCan"),
+    "mavlink": ("mtm_onboard.transports.mavlink", "MavlinkTransport"),
     "robomaster-uart": ("mtm_onboard.transports.robomaster_uart", "RoboMasterUart"),
     "robomaster-tcp": ("mtm_onboard.transports.robomaster_tcp", "RoboMasterTcp"),
 }
