@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.transports.base import LinkBusyError
 
 _CONNECT_WITHIN_S = 3.0
 _DELIVER_WITHIN_S = 0.2
@@ -40,7 +41,7 @@ class ByteLink:
     def write(self, message: bytes, within_s: float) -> None:
         """Give the whole of `message` to the line.
 
-        Raises MtmError when the line does not take it in `within_s` seconds or the link failed.
+        Raises LinkBusyError when the line does not take it in `within_s` seconds, and MtmError when the link failed.
         """
         deadline_s = time.monotonic() + within_s
         owed = len(self._unsent)
@@ -98,7 +99,7 @@ class ByteLink:
                 return
             remaining_s = deadline_s - time.monotonic()
             if remaining_s <= 0 or not select.select((), [self._descriptor], (), remaining_s)[1]:
-                raise MtmError(
+                raise LinkBusyError(
                     "The link took no command in time; check that the robot is on and that nothing blocks it."
                 )
 

@@ -2,13 +2,14 @@
 
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from hil.clock import SimulatedClock
 from hil.robots.motion_controller import MotionController
 from hil.robots.plaintext_node import PlaintextMotionController
 from hil.robots.plaintext_ports import LinePort, Port, PtyPort, TcpPort
+from mtm_onboard.motion import BodyVelocity
 from mtm_onboard.transports.byte_link import ByteLink
 from mtm_onboard.transports.robomaster_plaintext import RoboMasterPlaintext
 from mtm_onboard.transports.robomaster_tcp import RoboMasterTcp
@@ -61,20 +62,20 @@ class CountingPort:
 
 
 class PlaintextRig:
-    """`kind` is "memory", "pty" or "tcp"; in simulated time whatever the line."""
+    """`kind` is "memory", "pty" or "tcp"; in simulated time whatever the line. `others` are further ports."""
 
-    def __init__(self, kind: str, poll_s: float = 0.010) -> None:
+    def __init__(self, kind: str, others: Sequence[Port] = ()) -> None:
         self.clock = SimulatedClock()
         self.plant = FloatingPlant()
         self.controller = MotionController(self.plant, deadman_s=None)
         self.links: list[ByteLink] = []
-        self._ends: list[socket.socket] = []
+        self.ends: list[socket.socket] = []
         self.transport, port = self._line(kind)
         self.port = CountingPort(port, self)
-        self.node = PlaintextMotionController(self.controller, [self.port])
+        self.node = PlaintextMotionController(self.controller, [*others, self.port])
         self._connect = self.transport._connect
         self.transport._connect = self._counted_link
-        self.clock.every(poll_s, self.node.poll)
+        self.clock.every(0.010, self.node.poll)
         self.clock.every(self.transport.service_period_s, self._service)
 
     def sent_bytes(self) -> int:
@@ -83,10 +84,15 @@ class PlaintextRig:
     def run(self, seconds: float) -> None:
         self.clock.sleep_until(self.clock.now() + seconds)
 
+    def drive(self, velocity: BodyVelocity, seconds: float) -> None:
+        for _ in range(round(seconds / 0.02)):
+            self.transport.send(velocity)
+            self.run(0.02)
+
     def shutdown(self) -> None:
         self.transport.close()
         self.node.shutdown()
-        for end in self._ends:
+        for end in self.ends:
             end.close()
 
     def _line(self, kind: str) -> tuple[RoboMasterPlaintext, Port]:
@@ -98,7 +104,7 @@ class PlaintextRig:
             tcp_port = TcpPort(push_port=push_port)
             return RoboMasterTcp("127.0.0.1", tcp_port.port, push_port), tcp_port
         ours, theirs = socket.socketpair()
-        self._ends = [ours, theirs]
+        self.ends = [ours, theirs]
         return OverSocket(ours), LinePort(theirs.fileno(), lambda: None)
 
     def _counted_link(self) -> ByteLink:
@@ -123,8 +129,8 @@ def free_udp_port() -> int:
 
 
 @contextmanager
-def plaintext_rig(kind: str = "memory", poll_s: float = 0.010) -> Iterator[PlaintextRig]:
-    rig = PlaintextRig(kind, poll_s)
+def plaintext_rig(kind: str = "memory", others: Sequence[Port] = ()) -> Iterator[PlaintextRig]:
+    rig = PlaintextRig(kind, others)
     try:
         yield rig
     finally:
