@@ -10,6 +10,9 @@ _COMMANDS = (
     "mtm_onboard.commands.keygen",
     "mtm_onboard.commands.show",
     "mtm_onboard.commands.run",
+    "mtm_onboard.commands.send",
+    "mtm_onboard.commands.status",
+    "mtm_onboard.commands.stop",
     "mtm_onboard.commands.export",
 )
 

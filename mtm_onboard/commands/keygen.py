@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mtm_onboard.protocol import Channel, Scheme
+    from mtm_onboard.protocol.framing import Framing
 
 _PRESETS: dict[str, dict[str, Any]] = {
     "robomaster-fleet": {
@@ -19,7 +20,8 @@ _PRESETS: dict[str, dict[str, Any]] = {
     }
 }
 _REQUIRED = ("name", "rate", "band", "alphabet", "message_ticks", "channel")
-_CHOSEN_BY_SCHEME = ("combine", "power", "schedule")
+_CHOSEN_BY_SCHEME = ("combine", "pooling", "power", "schedule", "epoch")
+_FRAMING = ("payload", "number_bits", "check", "code", "interleave")
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -39,16 +41,30 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="a channel, such as robot0:vx,vy:1:0.1, once for each; the body is named like the channel unless given",
     )  # fmt: skip
     parser.add_argument("--combine", help="split (default): each channel carries its part; same: all carry all")
+    parser.add_argument("--pooling", help="how auditors pool channels that carry the same: mean (default) or majority")
     parser.add_argument("--power", help="window (default): each window has mean square 1; ensemble: Gaussian samples")
     parser.add_argument("--schedule", help="fixed (default): waveforms come again; rolling: none is played twice")
+    parser.add_argument("--epoch", type=int, metavar="N", help="number of the first epoch (0)")
+    _add_framing(parser)
     parser.set_defaults(handler=_keygen, usage_error=parser.error)
+
+
+def _add_framing(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("framing", "without --payload a message is a plain number")
+    group.add_argument(
+        "--payload", type=_sized, metavar="KIND:SIZE", help="integer:BITS, bytes:BYTES or text:BYTES, such as text:16"
+    )
+    group.add_argument("--number-bits", type=int, metavar="BITS", help="carry the message's number, modulo 2**BITS (0)")
+    group.add_argument("--check", type=_sized, metavar="KIND:BITS", help="crc:BITS or tag:BITS, such as tag:32 (none)")
+    group.add_argument("--code", help="none (default), or reed-solomon: whatever is left free becomes parity")
+    group.add_argument("--interleave", action="store_true", default=None, help="deal symbols over channels and time")
 
 
 def _keygen(args: argparse.Namespace) -> int:
     from mtm_onboard.protocol import generate_key, save_key
     from mtm_onboard.protocol.schemefile import load_scheme
 
-    given = {name: getattr(args, name) for name in (*_REQUIRED, *_CHOSEN_BY_SCHEME)}
+    given = {name: getattr(args, name) for name in (*_REQUIRED, *_CHOSEN_BY_SCHEME, *_FRAMING)}
     if args.scheme is None:
         scheme = _chosen_scheme(args, given)
     elif args.preset is not None or any(value is not None for value in given.values()):
@@ -70,8 +86,26 @@ def _chosen_scheme(args: argparse.Namespace, given: dict[str, Any]) -> "Scheme":
     return Scheme(
         name=chosen["name"], rate_hz=chosen["rate"], band_hz=chosen["band"], alphabet_size=chosen["alphabet"],
         message_ticks=chosen["message_ticks"], channels=tuple(_channel(text) for text in chosen["channel"]),
+        framing=_framing(args, {name: chosen[name] for name in _FRAMING if name in chosen}),
         **{name: chosen[name] for name in _CHOSEN_BY_SCHEME if name in chosen},
     )  # fmt: skip
+
+
+def _framing(args: argparse.Namespace, chosen: dict[str, Any]) -> "Framing | None":
+    from mtm_onboard.protocol.framing import Framing
+
+    if not chosen:
+        return None
+    if "payload" not in chosen:
+        args.usage_error("a framing needs --payload, such as --payload integer:64")
+    payload, size = chosen.pop("payload")
+    chosen["check"], chosen["check_bits"] = chosen.get("check", ("none", 0))
+    return Framing(payload, size if payload == "integer" else 8 * size, **chosen)
+
+
+def _sized(text: str) -> tuple[str, int]:
+    kind, size = text.split(":")
+    return kind, int(size)
 
 
 def _band(text: str) -> tuple[float, float]:

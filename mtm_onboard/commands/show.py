@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from mtm_onboard.protocol import Key
+    from mtm_onboard.protocol import Key, Scheme
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -23,7 +23,6 @@ def _show(args: argparse.Namespace) -> int:
 
 
 def _lines(key: "Key") -> list[str]:
-    from mtm_onboard.protocol.framing import payload_bits
     from mtm_onboard.protocol.scheme import count_bins
 
     scheme = key.scheme
@@ -36,8 +35,8 @@ def _lines(key: "Key") -> list[str]:
         f"rate          {scheme.rate_hz:g} Hz",
         f"band          {low_hz:g} to {high_hz:g} Hz",
         f"alphabet      {scheme.alphabet_size} symbols",
-        f"message       {scheme.message_ticks} ticks, {duration_s:g} s, {scheme.message_symbols} symbols, "
-        f"{payload_bits(scheme)} bits",
+        f"message       {scheme.message_ticks} ticks, {duration_s:g} s, {scheme.message_symbols} symbols",
+        *_frame_lines(scheme),
         f"played as     combine {scheme.combine}, pooling {scheme.pooling}, power {scheme.power}, "
         f"schedule {scheme.schedule}",
     ]
@@ -49,3 +48,35 @@ def _lines(key: "Key") -> list[str]:
             f"sigma {channel.sigma:g}"
         )
     return lines
+
+
+def _frame_lines(scheme: "Scheme") -> list[str]:
+    from mtm_onboard.protocol.framing import payload_bits
+
+    framing = scheme.framing
+    bits = payload_bits(scheme) if framing is None else framing.payload_bits
+    rate_bps = bits * scheme.rate_hz / scheme.message_ticks
+    if framing is None:
+        return [f"payload       a plain number of {bits} bits, without check or code: {rate_bps:.3g} bits/s"]
+    kind = f"a number of {bits} bits" if framing.payload == "integer" else f"up to {bits // 8} bytes"
+    kind += " of text" if framing.payload == "text" else ""
+    check = {"none": "no check", "crc": f"CRC of {framing.check_bits} bits", "tag": f"tag of {framing.check_bits} bits"}
+    counted = f"message number modulo {1 << framing.number_bits}" if framing.number_bits else "no message number"
+    return [
+        f"payload       {kind}: {bits} bits, {rate_bps:.3g} bits/s",
+        f"frame         {counted}, {check[framing.check]}, {_code_words(scheme)}, "
+        f"{'interleaved' if framing.interleave else 'not interleaved'}",
+    ]
+
+
+def _code_words(scheme: "Scheme") -> str:
+    from mtm_onboard.protocol.framing.framing import layout_of
+
+    assert scheme.framing is not None
+    if scheme.framing.code == "none":
+        return "no code"
+    layout = layout_of(scheme.framing, scheme.alphabet_size, scheme.message_symbols)
+    return (
+        f"Reed-Solomon over GF(2^{layout.field_bits}), {layout.parity} of {layout.code_symbols} code symbols parity "
+        f"(corrects {layout.parity // 2} wrong or {layout.parity} missing ones)"
+    )

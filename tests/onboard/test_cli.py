@@ -97,7 +97,13 @@ def test_an_option_overrides_its_part_of_a_preset(tmp_path):
 def test_show_tells_the_scheme_and_never_the_secret(key, capsys):
     assert main(["show", "--key", str(key)]) == 0
     shown = capsys.readouterr().out
-    for fact in (load_key(key).scheme.fingerprint, "fake-key", "600 ticks, 12 s, 4 symbols, 8 bits", "55 tones"):
+    for fact in (
+        load_key(key).scheme.fingerprint,
+        "fake-key",
+        "600 ticks, 12 s, 4 symbols",
+        "number of 8 bits",
+        "55 tones",
+    ):
         assert fact in shown
     assert load_key(key).secret.hex() not in shown
 

@@ -1,0 +1,29 @@
+"""`mtm-onboard send`: another message for a robot that runs."""
+
+import argparse
+
+from mtm_onboard.commands.contentoptions import add_content, content_table
+from mtm_onboard.commands.controloptions import add_robot, socket_path
+
+
+def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command and its options."""
+    parser = subparsers.add_parser("send", help="give a running robot another message, from its next boundary on")
+    add_robot(parser)
+    add_content(parser)
+    parser.set_defaults(handler=_send)
+
+
+def _send(args: argparse.Namespace) -> int:
+    from datetime import UTC, datetime
+
+    from mtm_onboard.controlsocket import ask
+
+    answer = ask(socket_path(args), {"command": "send", "content": content_table(args)})
+    start = datetime.fromtimestamp(answer["unix_s"], UTC)
+    slot = "" if answer["slot"] is None else f", slot {answer['slot']}"
+    instead = "" if answer["replaces"] is None else f", in the place of message {answer['replaces']} that was waiting"
+    print(
+        f"message {answer['number']} begins at {start:%Y-%m-%d %H:%M:%S.%f} UTC ({answer['unix_s']:.6f}){slot}{instead}"
+    )
+    return 0
