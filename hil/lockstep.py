@@ -15,13 +15,14 @@ from hil.robots.direct import DirectTransport
 from hil.robots.mecanum import MecanumPlant
 from hil.robots.motion_controller import MotionController
 from hil.sensors.poses import Floats, Trajectory
-from hil.worlds.robomaster import GoToGoal, Route, routes
+from hil.worlds.robomaster import Route, Task, routes
 from mtm_onboard.guard import Guard, Staleness
 from mtm_onboard.loop import LoopStats, run_loop
+from mtm_onboard.message import Message
 from mtm_onboard.motion import STOP
 from mtm_onboard.protocol import Channel
 from mtm_onboard.protocol.framing import channel_symbols
-from mtm_onboard.runtime import Runtime
+from mtm_onboard.runtime import NoiseAdder, Runtime
 from mtm_onboard.source import HeldSource
 from mtm_onboard.transports.base import Transport
 from mtm_onboard.transports.robomaster_can import RoboMasterCan
@@ -45,7 +46,7 @@ class _Robot:
     plant: MecanumPlant
     controller: MotionController
     link: _Link
-    task: GoToGoal
+    task: Task
     source: HeldSource
     guard: Guard
     runtime: Runtime
@@ -92,14 +93,14 @@ def run_lockstep(settings: RunSettings) -> RunResult:
     clock.sleep_until(settings.seconds + _SETTLING_S)
     motion = np.frombuffer(poses[:samples], dtype=np.float64).reshape(-1, len(robots), 3)
     names = [channel.body for channel in scheme.channels]
-    return RunResult(_trajectories(names, motion), settings.start_s, tuple(robot.report(stats) for robot in robots))
+    return RunResult(_trajectories(names, motion), settings.onset_s, tuple(robot.report(stats) for robot in robots))
 
 
 def _loop(settings: RunSettings, clock: SimulatedClock, step: Callable[[int, float], None]) -> LoopStats:
     # A tick that falls on the very end would have no motion to show.
     end_s = settings.seconds - 1e-6
     return run_loop(
-        clock, settings.key.scheme.rate_hz, step, start_s=settings.start_s, stop=lambda: clock.now() >= end_s
+        clock, settings.key.scheme.rate_hz, step, start_s=settings.onset_s, stop=lambda: clock.now() >= end_s
     )
 
 
@@ -114,20 +115,16 @@ def _opened(transports: list[Transport], clock: SimulatedClock) -> Iterator[None
 
 
 def _robots(settings: RunSettings, clock: SimulatedClock) -> list[_Robot]:
-    seeds, scheme = seeds_of(settings.seed), settings.key.scheme
-    parts = None if settings.symbols is None else channel_symbols(settings.symbols, scheme)
+    seeds, scheme, message = seeds_of(settings.seed), settings.key.scheme, settings.message()
     each = zip(scheme.channels, seeds.slips, routes(seeds.permutation()), strict=True)
-    return [
-        _robot(settings, clock, channel, None if parts is None else parts[channel.name], slip_seed, route)
-        for channel, slip_seed, route in each
-    ]
+    return [_robot(settings, clock, channel, message, slip_seed, route) for channel, slip_seed, route in each]
 
 
 def _robot(
     settings: RunSettings,
     clock: SimulatedClock,
     channel: Channel,
-    symbols: tuple[int, ...] | None,
+    message: Message | None,
     slip_seed: int,
     route: Route,
 ) -> _Robot:
@@ -137,9 +134,17 @@ def _robot(
     source = HeldSource()
     period_s = 1.0 / settings.key.scheme.rate_hz
     guard = Guard(LIMITS, Staleness(), noise_sigma=channel.sigma, period_s=period_s)
-    modulator = None if symbols is None else settings.modulator(settings.key.codebook(), channel.name, symbols)
+    modulator = None if message is None else _modulator(settings, channel, message)
     runtime = Runtime(modulator, guard, source, link.transport)
-    return _Robot(channel.body, plant, controller, link, GoToGoal(route), source, guard, runtime)
+    return _Robot(channel.body, plant, controller, link, settings.task(route, slip_seed), source, guard, runtime)
+
+
+def _modulator(settings: RunSettings, channel: Channel, message: Message) -> NoiseAdder:
+    codebook, scheme = settings.key.codebook(settings.first_slot), settings.key.scheme
+    if settings.payload is not None and scheme.schedule == "rolling":
+        return settings.modulator(codebook, channel.name, message)
+    own = channel_symbols(message.symbols(settings.first_slot), scheme)[channel.name]
+    return settings.modulator(codebook, channel.name, own)
 
 
 def _can_link(controller: MotionController) -> _Link:

@@ -7,7 +7,7 @@ instant. This process is the robots' motion controllers, the chassis, and the co
 import time
 from array import array
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from mtm_onboard.client import BaseCommandClient
 from mtm_onboard.clock import SystemClock
 from mtm_onboard.loop import run_loop
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 
 # Four interpreters have to start before the message does.
 START_S = 4.0
@@ -55,9 +56,11 @@ def run_realtime(settings: RunSettings, key_file: Path, folder: Path) -> RunResu
     `key_file` holds `settings.key`; the plants' wire is the CAN protocol over a pseudo-terminal. Raises MtmError when
     a program fails, starts too late or sends a tick twice.
     """
-    clock = SystemClock()
+    clock, asked_start_s = SystemClock(), settings.start_s
     with ExitStack() as stack:
         began_s, start_unix_s = clock.now(), time.time() + settings.start_s
+        settings = _aligned(settings, start_unix_s)
+        start_unix_s += settings.start_s - asked_start_s
         robots = _robots(settings, _arguments(settings, key_file, start_unix_s), folder, stack)
         motion, times_s = _drive(settings, clock, began_s, robots)
         for robot in robots:
@@ -72,6 +75,15 @@ def run_realtime(settings: RunSettings, key_file: Path, folder: Path) -> RunResu
         for number, robot in enumerate(robots)
     )
     return RunResult(trajectories, settings.start_s, reports)
+
+
+def _aligned(settings: RunSettings, start_unix_s: float) -> RunSettings:
+    """The same run, later by what remains until its message's slot begins."""
+    scheme = settings.key.scheme
+    if scheme.schedule == "fixed":
+        return settings
+    later_s = slot_start_unix_s(next_slot(start_unix_s, scheme), scheme) - start_unix_s
+    return replace(settings, start_s=settings.start_s + later_s, seconds=settings.seconds + later_s)
 
 
 def _drive(
@@ -111,12 +123,20 @@ def _drive(
 
 
 def _arguments(settings: RunSettings, key_file: Path, start_unix_s: float) -> list[str]:
-    symbols = settings.symbols
-    message = ["--no-message"] if symbols is None else ["--symbols", ",".join(map(str, symbols))]
     return [
-        "--key", str(key_file.resolve()), *message, "--start-at", f"{start_unix_s:.6f}",
+        "--key", str(key_file.resolve()), *_content(settings), "--start-at", f"{start_unix_s:.6f}",
         "--duration", f"{settings.seconds - settings.start_s:.6f}",
     ]  # fmt: skip
+
+
+def _content(settings: RunSettings) -> list[str]:
+    symbols, payload = settings.symbols, settings.payload
+    if symbols is not None:
+        return ["--symbols", ",".join(map(str, symbols))]
+    if isinstance(payload, bytes):
+        return ["--hex", payload.hex()]
+    # A text may begin like an option, so it stands in one argument with its own.
+    return ["--no-message"] if payload is None else [f"--{'text' if isinstance(payload, str) else 'message'}={payload}"]
 
 
 def _robots(settings: RunSettings, arguments: list[str], folder: Path, stack: ExitStack) -> list[_Robot]:

@@ -56,11 +56,12 @@ def write_recording(
 
 def truth(settings: RunSettings, result: RunResult) -> dict[str, Any]:
     """What was sent, for comparison with what is decoded; `message` is None when nothing was."""
-    scheme, symbols = settings.key.scheme, settings.symbols
+    scheme, message = settings.key.scheme, settings.message()
     return {
-        "message": None if symbols is None else number_of_symbols(symbols, scheme),
-        "symbols": symbols,
-        "onset_s": None if symbols is None else result.onset_s,
+        "message": _message(settings),
+        "symbols": None if message is None else message.symbols(settings.first_slot),
+        "onset_s": None if message is None else result.onset_s,
+        "unix_s": settings.unix_s,
         "seconds": settings.seconds,
         "key_id": settings.key.id,
         "scheme": scheme.name,
@@ -68,6 +69,12 @@ def truth(settings: RunSettings, result: RunResult) -> dict[str, Any]:
         "seed": settings.seed,
         "robots": [{"name": robot.name, "sent": robot.sent, "missed": robot.missed} for robot in result.robots],
     }
+
+
+def _message(settings: RunSettings) -> int | str | None:
+    if settings.symbols is not None:
+        return number_of_symbols(settings.symbols, settings.key.scheme)
+    return settings.payload.hex() if isinstance(settings.payload, bytes) else settings.payload
 
 
 def _generators(seed: int) -> tuple[np.random.Generator, np.random.Generator]:

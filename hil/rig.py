@@ -3,24 +3,26 @@
 One integer seed decides everything random about a run except its waveforms, which come from the key alone.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from hil.robots.mecanum import MecanumParameters, calibrated_parameters
 from hil.sensors.poses import Trajectory
-from hil.worlds.robomaster import ROBOTS, random_permutation
+from hil.worlds.robomaster import ROBOTS, TaskFactory, go_to_goal, random_permutation
 from mtm_onboard.guard import Limits
+from mtm_onboard.message import Message, message_of
 from mtm_onboard.modulator import Modulator
 from mtm_onboard.protocol import Codebook, Key, MtmError
-from mtm_onboard.protocol.framing import check_symbols
+from mtm_onboard.protocol.framing import Payload
+from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.runtime import NoiseAdder
 
 Wire = Literal["can", "direct"]
-# Codebook, channel name and the channel's own symbols, as `Modulator` takes them.
-ModulatorFactory = Callable[[Codebook, str, Sequence[int]], NoiseAdder]
+# Codebook, channel name and, as `Modulator` takes them, the channel's own symbols or a message that changes them.
+ModulatorFactory = Callable[[Codebook, str, Any], NoiseAdder]
 
 SAMPLE_PERIOD_S = 0.01
 LIMITS = Limits(speed_mps=1.0, turn_rate_radps=2.0)
@@ -30,9 +32,12 @@ LIMITS = Limits(speed_mps=1.0, turn_rate_radps=2.0)
 class RunSettings:
     """A run of `seconds`, whose message begins at `start_s` and repeats until the end.
 
-    `symbols` is the whole message, None when the robots move without one. `wire` "can" is the whole CAN protocol in
+    `symbols` is the whole message, or `payload` what a scheme with framing sends; both are None when the robots move
+    without one. The run begins at `unix_s`, and under the rolling schedule its message with the first slot from
+    `start_s` on, see `onset_s`; None has slot 0 begin at `start_s`. `wire` "can" is the whole CAN protocol in
     both directions, "direct" gives the same motion without it. `modulator` may put something else, such as the C shim,
-    in the place of the Python one. Raises MtmError when the key does not fit this world or the spans make no sense.
+    in the place of the Python one, and `task` other work in the place of the paper's. Raises MtmError when the key does
+    not fit this world or the spans make no sense.
     """
 
     key: Key
@@ -42,7 +47,10 @@ class RunSettings:
     wire: Wire = "can"
     start_s: float = 1.5
     modulator: ModulatorFactory = Modulator
+    task: TaskFactory = go_to_goal
     plant: MecanumParameters = field(default_factory=calibrated_parameters)
+    payload: Payload | None = None
+    unix_s: float | None = None
 
     def __post_init__(self) -> None:
         scheme = self.key.scheme
@@ -53,14 +61,35 @@ class RunSettings:
             )
         if len({channel.body for channel in scheme.channels}) != ROBOTS:
             raise MtmError("two channels of the key's scheme move the same body; give each robot one channel")
-        if not 0.0 <= self.start_s < self.seconds < np.inf:
+        if not 0.0 <= self.start_s <= self.onset_s < self.seconds < np.inf:
             raise MtmError(
-                f"the run lasts {self.seconds:g} s and its message begins at {self.start_s:g} s; make it last longer"
+                f"the run lasts {self.seconds:g} s and its message begins at {self.onset_s:g} s; make it last longer"
             )
-        if self.symbols is not None:
-            check_symbols(self.symbols, scheme)
+        if self.symbols is not None and self.payload is not None:
+            raise MtmError("both symbols and a payload are given; choose one")
+        self.message()
         if self.seed < 0:
             raise MtmError(f"the seed is {self.seed}; give a whole number from 0 on")
+
+    @property
+    def first_slot(self) -> int:
+        """The slot that the message begins with; 0 under the fixed schedule."""
+        scheme = self.key.scheme
+        if scheme.schedule == "fixed" or self.unix_s is None:
+            return 0
+        return next_slot(self.unix_s + self.start_s, scheme)
+
+    @property
+    def onset_s(self) -> float:
+        """When the message begins, in seconds since the run's beginning."""
+        if self.key.scheme.schedule == "fixed" or self.unix_s is None:
+            return self.start_s
+        return slot_start_unix_s(self.first_slot, self.key.scheme) - self.unix_s
+
+    def message(self) -> Message | None:
+        """What the robots send; raises MtmError when the scheme does not carry it."""
+        content = self.symbols if self.payload is None else self.payload
+        return None if content is None else message_of(content, self.key)
 
 
 @dataclass(frozen=True)

@@ -43,11 +43,13 @@ class RecordOptions:
 def record(options: RecordOptions, console: Console) -> None:
     """Write the recording folder, whole or not at all; raises MtmError when it exists or an option does not fit."""
     key = generate_key("hil", fleet_scheme()) if options.key is None else load_key(options.key)
-    symbols = None if options.message is None else symbols_of_number(options.message, key.scheme)
+    framed = key.scheme.framing is not None
+    symbols = None if options.message is None or framed else symbols_of_number(options.message, key.scheme)
     sensors = Sensors(camera=None if options.camera is None else CAMERAS[options.camera])
     settings = RunSettings(
-        key, symbols, options.seconds, options.seed, options.wire, START_S if options.realtime else LEAD_S
-    )
+        key, symbols, options.seconds, options.seed, options.wire, START_S if options.realtime else LEAD_S,
+        payload=options.message if framed else None,
+    )  # fmt: skip
     with new_folder(options.out) as folder:
         if options.key is None:
             save_key(key, folder / KEY_NAME)

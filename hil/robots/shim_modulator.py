@@ -29,6 +29,8 @@ class ShimModulator:
 
     def __init__(self, codebook: Codebook, channel_name: str, symbols: Sequence[int], *, repeat: bool = True) -> None:
         scheme = codebook.scheme
+        if not isinstance(symbols, Sequence):
+            raise MtmError("the shim plays the same symbols in every message; use the Python modulator for this scheme")
         self.channel = scheme.channel(channel_name)
         self.symbols = tuple(symbols)
         self.message_ticks = scheme.message_ticks
