@@ -8,13 +8,15 @@ from contextlib import suppress
 from mtm_onboard.clock import Clock
 from mtm_onboard.motion import BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
-from mtm_onboard.transports.base import LinkBusyError, Transport
+from mtm_onboard.transports.base import LinkBusyError, TakenOverError, Transport
 
 _FIRST_PAUSE_S = 0.1
 _LONGEST_PAUSE_S = 5.0
 # A tenth of a second at 50 Hz: a host that stalls for a moment is no lost link, and a line that stays full is one.
 _MOST_BUSY = 5
 _LONGEST_PERIOD_S = 0.05
+# A link that is lost sooner after it came back was never back: the outage and its pauses go on.
+_SETTLED_S = 5.0
 
 
 class ReconnectingTransport(Transport):
@@ -23,7 +25,7 @@ class ReconnectingTransport(Transport):
     A `send` or `service` that fails takes the link down, as do several `LinkBusyError` in a row. While it is down,
     `send` returns at once, counted in `dropped`; `service` tells the robot to stop, releases the old link, and tries
     to open a new one after 0.1 s, then after pauses that double up to 5 s. Only `service` waits for any of that.
-    After `give_up_s` without a link `send` raises MtmError.
+    After `give_up_s` without a link that holds `send` raises MtmError.
 
     That nothing moves before a base command has come over the new link is the runtime's part, see `up_since_s`.
     """
@@ -41,7 +43,7 @@ class ReconnectingTransport(Transport):
         self._engaged = False
         self._told_to_stop = True
         self._busy = 0
-        self._lost_s = self._next_try_s = 0.0
+        self._out_since_s = self._next_try_s = 0.0
         self._pause_s = _FIRST_PAUSE_S
         self.service_period_s = min(_LONGEST_PERIOD_S, self._link.service_period_s)
         self.write_bound_s = self._link.write_bound_s
@@ -76,8 +78,8 @@ class ReconnectingTransport(Transport):
     def send(self, velocity: BodyVelocity) -> None:
         """Send one command, or drop and count it.
 
-        Raises ValueError for values that no link takes, and MtmError before `open`, after `stop`, and when the link
-        has been down for `give_up_s`.
+        Raises ValueError for values that no link takes, MtmError before `open`, after `stop`, and when the link has
+        been down for `give_up_s`, and TakenOverError when somebody else has the robot.
         """
         if not velocity.is_finite():
             raise ValueError(f"the command {tuple(velocity)} is not finite; send finite speeds only")
@@ -90,7 +92,7 @@ class ReconnectingTransport(Transport):
             return
         try:
             link.send(velocity)
-        except ValueError:
+        except (ValueError, TakenOverError):
             raise
         except Exception as error:
             self.dropped += 1
@@ -143,9 +145,13 @@ class ReconnectingTransport(Transport):
             self.fault = str(error)
             self.losses += 1
             self._busy = 0
-            self._lost_s = self._clock.now()
-            self._pause_s = _FIRST_PAUSE_S
-            self._next_try_s = self._lost_s + self._pause_s
+            now_s = self._clock.now()
+            if now_s - self.up_since_s >= _SETTLED_S:
+                self._out_since_s = now_s
+                self._pause_s = _FIRST_PAUSE_S
+            else:
+                self._pause_s = _longer(self._pause_s)
+            self._next_try_s = now_s + self._pause_s
             self.up_since_s = None
 
     def _release(self, link: Transport) -> None:
@@ -164,13 +170,13 @@ class ReconnectingTransport(Transport):
         link = None
         try:
             link = self._make()
-            link.open()
+            link.resume()
         except Exception as error:
             if link is not None:
                 with suppress(Exception):
                     link.close()
             self.fault = str(error)
-            self._pause_s = min(2.0 * self._pause_s, _LONGEST_PAUSE_S)
+            self._pause_s = _longer(self._pause_s)
             self._next_try_s = self._clock.now() + self._pause_s
             return
         with self._lock:
@@ -185,6 +191,10 @@ class ReconnectingTransport(Transport):
             link.close()
 
     def _check_patience(self) -> None:
-        down_s = self._clock.now() - self._lost_s
+        down_s = self._clock.now() - self._out_since_s
         if down_s >= self._give_up_s:
             raise MtmError(f"the link has been down for {down_s:.0f} s ({self.fault}); check the cable and the robot")
+
+
+def _longer(pause_s: float) -> float:
+    return min(2.0 * pause_s, _LONGEST_PAUSE_S)

@@ -1,6 +1,7 @@
 """A RoboMaster link with the simulated robot at its far end, over python-can's virtual bus or a line in memory."""
 
 import itertools
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -10,24 +11,54 @@ from hil.clock import SimulatedClock
 from hil.robots.can_line import LineEnd, can_line
 from hil.robots.can_node import CanMotionController
 from hil.robots.motion_controller import MotionController
+from mtm_onboard.protocol import MtmError
 from mtm_onboard.transports.robomaster_can import RoboMasterCan
 from tests.hil.robots.floating_plant import FloatingPlant
 
 _CHANNELS = (f"robomaster-{number}" for number in itertools.count())
 
 
-class TappedEnd:
-    """One end of a line that also keeps what is sent through it."""
+class Wiring:
+    """What is wrong with the wire: how many frames it still refuses, whether it is cut, or clogged."""
 
-    def __init__(self, end: LineEnd, tap: list[can.Message]) -> None:
-        self._end = end
+    def __init__(self) -> None:
+        self.refusing = 0
+        self.is_cut = False
+        self.is_clogged = False
+
+    def carry(self, timeout: float | None) -> None:
+        if self.refusing:
+            self.refusing -= 1
+            raise can.CanOperationError("frame refused")
+        if self.is_cut:
+            raise can.CanOperationError("bus off")
+        if self.is_clogged:
+            time.sleep(timeout or 0.0)
+            raise can.CanOperationError("transmit buffer full")
+
+
+class WiredBus:
+    """A bus behind a `Wiring`, which also keeps what is sent."""
+
+    def __init__(self, bus: can.BusABC | LineEnd, wiring: Wiring, tap: list[can.Message]) -> None:
+        self._bus = bus
+        self._wiring = wiring
         self._tap = tap
-        self.recv = end.recv
-        self.shutdown = end.shutdown
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self._wiring.carry(timeout)
         self._tap.append(msg)
-        self._end.send(msg, timeout)
+        self._bus.send(msg, timeout)
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        if self._wiring.is_cut:
+            raise can.CanOperationError("bus off")
+        return self._bus.recv(timeout)
+
+    def shutdown(self) -> None:
+        # The line in memory has one end for all who come after one another.
+        if not isinstance(self._bus, LineEnd):
+            self._bus.shutdown()
 
 
 class Rig:
@@ -38,6 +69,7 @@ class Rig:
     controller: MotionController
     node: CanMotionController
     transport: RoboMasterCan
+    wiring: Wiring
 
     def assemble(self, node_bus: can.BusABC | LineEnd, deadman_s: float | None, poll_s: float) -> None:
         self.clock = SimulatedClock()
@@ -50,6 +82,28 @@ class Rig:
     def run(self, seconds: float) -> None:
         self.clock.sleep_until(self.clock.now() + seconds)
 
+    def remake(self) -> RoboMasterCan:
+        """Another transport to the same robot; raises MtmError while the wire is cut."""
+        if self.wiring.is_cut:
+            raise MtmError("no adapter there")
+        return RoboMasterCan(WiredBus(self.bus(), self.wiring, []))
+
+    def bus(self) -> can.BusABC | LineEnd:
+        """Our end of the wire."""
+        raise NotImplementedError
+
+    def cut(self) -> None:
+        self.wiring.is_cut = True
+
+    def mend(self) -> None:
+        self.wiring.is_cut = False
+
+    def clog(self) -> None:
+        self.wiring.is_clogged = True
+
+    def refuse(self, frames: int) -> None:
+        self.wiring.refusing = frames
+
     def sent(self) -> list[can.Message]:
         """Every frame that the transport has put on the bus so far."""
         raise NotImplementedError
@@ -61,11 +115,17 @@ class Rig:
 
 class VirtualRig(Rig):
     def __init__(self, deadman_s: float | None = None, poll_s: float = 0.010) -> None:
-        channel = next(_CHANNELS)
+        self._channel = channel = next(_CHANNELS)
+        self.wiring = Wiring()
         self.tap = can.Bus(interface="virtual", channel=channel)
         self.transport = RoboMasterCan(interface="virtual", channel=channel)
+        opened = self.transport._opened_bus
+        self.transport._opened_bus = lambda: WiredBus(opened(), self.wiring, [])
         self._frames: list[can.Message] = []
         self.assemble(can.Bus(interface="virtual", channel=channel), deadman_s, poll_s)
+
+    def bus(self) -> can.BusABC:
+        return can.Bus(interface="virtual", channel=self._channel)
 
     def sent(self) -> list[can.Message]:
         while (frame := self.tap.recv(0)) is not None:
@@ -80,10 +140,14 @@ class VirtualRig(Rig):
 
 class LineRig(Rig):
     def __init__(self, deadman_s: float | None = None, poll_s: float = 0.010) -> None:
-        robots_end, our_end = can_line()
+        robots_end, self._our_end = can_line()
+        self.wiring = Wiring()
         self._frames: list[can.Message] = []
-        self.transport = RoboMasterCan(TappedEnd(our_end, self._frames))
+        self.transport = RoboMasterCan(WiredBus(self._our_end, self.wiring, self._frames))
         self.assemble(robots_end, deadman_s, poll_s)
+
+    def bus(self) -> LineEnd:
+        return self._our_end
 
     def sent(self) -> list[can.Message]:
         return self._frames

@@ -1,28 +1,51 @@
 """What every transport must do, proven by the plant at its far end. A test class inherits it and overrides `rig`."""
 
 import math
+import os
+import signal
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
+from statistics import median
 
 import pytest
 
 from hil.clock import SimulatedClock
 from hil.robots.motion_controller import MotionController
+from mtm_onboard.commands.run import _ending_signals
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.transports.base import Transport
+from mtm_onboard.transports.reconnecting import ReconnectingTransport
 from tests.hil.robots.floating_plant import FloatingPlant
+from tests.onboard.driven import Driven
 
 
 @dataclass
 class Rig:
-    """A transport and its robot on one simulated clock; `wire_bytes` counts what has left the transport so far."""
+    """A transport and its robot on one simulated clock; `wire_bytes` counts what has left the transport so far.
+
+    What a wire can suffer is optional, and tests that need what a rig lacks are skipped: `refuse(n)` has it refuse the
+    next n writes, `clog()` has it take nothing from now on, `cut()` and `mend()` break it and put it right. `remake()`
+    gives another transport to the same robot, which is not served by the clock yet.
+    """
 
     transport: Transport
     controller: MotionController
     plant: FloatingPlant
     clock: SimulatedClock
     wire_bytes: Callable[[], int]
+    refuse: Callable[[int], None] | None = field(default=None, kw_only=True)
+    clog: Callable[[], None] | None = field(default=None, kw_only=True)
+    cut: Callable[[], None] | None = field(default=None, kw_only=True)
+    mend: Callable[[], None] | None = field(default=None, kw_only=True)
+    remake: Callable[[], Transport] | None = field(default=None, kw_only=True)
+
+    def needs(self, *names):
+        for name in names:
+            if getattr(self, name) is None:
+                pytest.skip(f"this rig has no {name}")
 
     def drive(self, velocity, seconds=0.5):
         end_s = self.clock.now() + seconds
@@ -152,3 +175,98 @@ class TransportConformance:
             assert rig.plant.velocity_body == STOP
             rig.drive(self.other)
             assert rig.plant.velocity_body == self.other
+
+    def test_a_request_to_terminate_stops_the_robot(self, rig):
+        with _ending_signals() as asked_to_end, rig.transport:
+            driven = Driven(rig.transport, rig.clock)
+            driven.run(0.2, self.askew)
+            assert rig.plant.velocity_body != STOP
+            os.kill(os.getpid(), signal.SIGTERM)
+            asked_s = rig.clock.now()
+            driven.run(10.0, self.askew, stop=asked_to_end)
+            assert rig.clock.now() - asked_s < 0.1
+        rig.settle()
+        assert rig.plant.velocity_body == STOP
+        assert rig.is_released()
+
+    def test_a_deadman_at_the_far_end_outlives_the_commands_and_not_the_link(self, rig):
+        rig.controller.deadman_s = 0.2
+        with rig.transport:
+            rig.drive(self.askew)
+            rig.clock.sleep_until(rig.clock.now() + 0.3)
+            assert rig.plant.velocity_body == STOP
+            rig.drive(self.other)
+            assert rig.plant.velocity_body == self.other
+
+    @pytest.mark.parametrize("axis", range(3))
+    @pytest.mark.parametrize("speed", [1e2, 1e4, 1e9, 1e30, 1e308])
+    def test_a_velocity_out_of_range_is_refused_or_keeps_its_sign(self, rig, axis, speed):
+        """Nothing wraps round on the way, and the link works as before."""
+        values = [0.0, 0.0, 0.0]
+        with rig.transport:
+            for value in (speed, -speed):
+                values[axis] = value
+                with suppress(ValueError, MtmError):
+                    rig.transport.send(BodyVelocity(*values))
+                rig.clock.sleep_until(rig.clock.now() + 0.02)
+                reached = rig.plant.velocity_body
+                assert reached.is_finite()
+                assert reached[axis] * value >= 0.0
+                assert reached == STOP or [reached[other] for other in range(3) if other != axis] == [0.0, 0.0]
+                rig.drive(STOP, 0.04)
+            rig.drive(self.other)
+            assert rig.plant.velocity_body == self.other
+        assert rig.controller.faults == 0
+
+    @pytest.mark.parametrize("writes", [1, 2, 3])
+    def test_when_sending_fails_the_robot_is_stopped_all_the_same(self, rig, writes):
+        rig.needs("refuse")
+
+        def lose_a_write_while_driving():
+            with rig.transport:
+                Driven(rig.transport, rig.clock).run(0.2, self.askew)
+                rig.refuse(writes)
+                rig.transport.send(self.askew)
+
+        with pytest.raises(MtmError):
+            lose_a_write_while_driving()
+        rig.settle()
+        assert rig.plant.velocity_body == STOP
+        assert rig.is_released()
+
+    def test_a_clogged_wire_holds_no_command_up_for_longer_than_the_write_bound(self, rig):
+        rig.needs("clog")
+        durations_s = []
+        rig.transport.open()
+        rig.clog()
+        for _ in range(5):
+            began_s = time.monotonic()
+            with suppress(MtmError):
+                rig.transport.send(self.askew)
+            durations_s.append(time.monotonic() - began_s)
+        # A busy host may hold up single ones.
+        assert median(durations_s) <= rig.transport.write_bound_s + 0.01
+
+    def test_a_link_that_comes_back_moves_the_robot_only_for_a_command_from_after_that(self, rig):
+        rig.needs("cut", "mend", "remake")
+        rig.controller.deadman_s = 0.2
+        link = ReconnectingTransport(rig.remake, rig.clock)
+        rig.clock.every(link.service_period_s, link.service)
+        with link:
+            driven = Driven(link, rig.clock)
+            driven.run(0.5, self.askew)
+            assert rig.plant.velocity_body == pytest.approx(self.askew, abs=0.01)
+            rig.cut()
+            driven.run(1.0, self.askew)
+            assert rig.plant.velocity_body == STOP
+            assert (link.losses, link.up_since_s) == (1, None)
+            rig.mend()
+            driven.run(1.0)
+            assert link.up_since_s is not None
+            assert rig.is_engaged()
+            assert rig.plant.velocity_body == STOP
+            driven.run(0.2, self.other)
+            assert rig.plant.velocity_body == self.other
+        rig.settle()
+        assert rig.plant.velocity_body == STOP
+        assert rig.is_released()

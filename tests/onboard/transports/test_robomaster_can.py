@@ -20,7 +20,10 @@ class TestRoboMasterCanConforms(TransportConformance):
     @pytest.fixture(params=[VirtualRig, LineRig])
     def rig(self, request):
         with can_rig(request.param) as rig:
-            yield Rig(rig.transport, rig.controller, rig.plant, rig.clock, lambda: sum(map(len, rig.sent())))
+            yield Rig(
+                rig.transport, rig.controller, rig.plant, rig.clock, lambda: sum(map(len, rig.sent())),
+                refuse=rig.refuse, clog=rig.clog, cut=rig.cut, mend=rig.mend, remake=rig.remake,
+            )  # fmt: skip
 
 
 class BrokenBus:

@@ -1,0 +1,47 @@
+"""A robot's runtime in simulated time, whose base commands come from the test."""
+
+from collections.abc import Callable
+
+from hil.clock import SimulatedClock
+from mtm_onboard.guard import Guard, Limits, Staleness
+from mtm_onboard.journal import Journal
+from mtm_onboard.loop import LoopStats, run_loop
+from mtm_onboard.motion import BodyVelocity
+from mtm_onboard.runtime import NoiseAdder, Runtime
+from mtm_onboard.source import HeldSource
+from mtm_onboard.transports.base import Transport
+
+RATE_HZ = 50.0
+
+
+class Driven:
+    """`transport` is open and served on `clock`; tick 0 was at the clock's start."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        clock: SimulatedClock,
+        modulator: NoiseAdder | None = None,
+        limits: Limits | None = None,
+        staleness: Staleness | None = None,
+        journal: Journal | None = None,
+    ) -> None:
+        self.clock = clock
+        self.source = HeldSource()
+        limits, staleness = limits or Limits(1.0, 2.0), staleness or Staleness()
+        self.guard = Guard(limits, staleness, noise_sigma=0.1, period_s=1.0 / RATE_HZ)
+        self.stats = LoopStats()
+        self._runtime = Runtime(modulator, self.guard, self.source, transport, journal)
+
+    def run(self, seconds: float, base: BodyVelocity | None = None, stop: Callable[[], bool] = lambda: False) -> None:
+        """Tick for so long, with a fresh base command in each tick, or none."""
+        end_s = self.clock.now() + seconds - 1e-9
+
+        def step(tick: int, now_s: float) -> None:
+            if base is not None:
+                self.source.set(base, now_s)
+            self._runtime.step(tick, now_s)
+
+        run_loop(
+            self.clock, RATE_HZ, step, start_s=0.0, stop=lambda: stop() or self.clock.now() >= end_s, stats=self.stats
+        )
