@@ -56,11 +56,10 @@ def run_realtime(settings: RunSettings, key_file: Path, folder: Path) -> RunResu
     `key_file` holds `settings.key`; the plants' wire is the CAN protocol over a pseudo-terminal. Raises MtmError when
     a program fails, starts too late or sends a tick twice.
     """
-    clock, asked_start_s = SystemClock(), settings.start_s
+    clock = SystemClock()
     with ExitStack() as stack:
         began_s, start_unix_s = clock.now(), time.time() + settings.start_s
-        settings = _aligned(settings, start_unix_s)
-        start_unix_s += settings.start_s - asked_start_s
+        settings, start_unix_s = _aligned(settings, start_unix_s)
         robots = _robots(settings, _arguments(settings, key_file, start_unix_s), folder, stack)
         motion, times_s = _drive(settings, clock, began_s, robots)
         for robot in robots:
@@ -77,13 +76,15 @@ def run_realtime(settings: RunSettings, key_file: Path, folder: Path) -> RunResu
     return RunResult(trajectories, settings.start_s, reports)
 
 
-def _aligned(settings: RunSettings, start_unix_s: float) -> RunSettings:
-    """The same run, later by what remains until its message's slot begins."""
+def _aligned(settings: RunSettings, start_unix_s: float) -> tuple[RunSettings, float]:
+    """The same run and its message's start, later by what remains until a slot begins."""
     scheme = settings.key.scheme
     if scheme.schedule == "fixed":
-        return settings
-    later_s = slot_start_unix_s(next_slot(start_unix_s, scheme), scheme) - start_unix_s
-    return replace(settings, start_s=settings.start_s + later_s, seconds=settings.seconds + later_s)
+        return settings, start_unix_s
+    aligned_unix_s = slot_start_unix_s(next_slot(start_unix_s, scheme), scheme)
+    later_s = aligned_unix_s - start_unix_s
+    later = replace(settings, start_s=settings.start_s + later_s, seconds=settings.seconds + later_s)
+    return later, aligned_unix_s
 
 
 def _drive(

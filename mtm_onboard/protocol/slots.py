@@ -12,6 +12,9 @@ from mtm_onboard.protocol.scheme import Scheme
 
 EPOCH_S = 86_400
 
+# Sums and decimal texts of today's times are off by less.
+_HAIR_S = 1e-6
+
 
 def slot_at(unix_s: float, scheme: Scheme) -> int:
     """The slot that is under way at `unix_s`: the last one that has started. Raises MtmError for what is no time."""
@@ -23,9 +26,9 @@ def slot_at(unix_s: float, scheme: Scheme) -> int:
 
 
 def next_slot(unix_s: float, scheme: Scheme) -> int:
-    """The first slot that starts at `unix_s` or later; raises MtmError for what is no time."""
+    """The first slot that starts at `unix_s` or later, a microsecond earlier at most; raises MtmError for no time."""
     slot = slot_at(unix_s, scheme)
-    return slot if slot_start_unix_s(slot, scheme) >= unix_s else slot + 1
+    return slot if slot_start_unix_s(slot, scheme) >= unix_s - _HAIR_S else slot + 1
 
 
 def slot_start_unix_s(slot: int, scheme: Scheme) -> float:

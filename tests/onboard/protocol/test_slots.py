@@ -37,9 +37,14 @@ def test_a_slot_is_under_way_at_its_own_start(scheme, slot):
 
 
 @given(schemes, times_s)
-def test_the_next_slot_is_the_first_that_starts_no_earlier(scheme, unix_s):
+def test_the_next_slot_is_the_first_that_starts_no_earlier_than_by_a_microsecond(scheme, unix_s):
     slot = next_slot(unix_s, scheme)
-    assert slot_start_unix_s(slot - 1, scheme) < unix_s <= slot_start_unix_s(slot, scheme)
+    assert slot_start_unix_s(slot - 1, scheme) < unix_s <= slot_start_unix_s(slot, scheme) + 1.1e-6
+
+
+@given(schemes, slots)
+def test_the_next_slot_at_a_start_written_in_decimals_is_that_slot(scheme, slot):
+    assert next_slot(float(f"{slot_start_unix_s(slot, scheme):.6f}"), scheme) == slot
 
 
 @given(schemes, slots)
