@@ -5,7 +5,9 @@ speed; heading is held at zero. Positions are in the world frame, metres, origin
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -38,6 +40,23 @@ class Route:
 
     start_xy_m: tuple[float, float]
     points_xy_m: tuple[tuple[float, float], ...]
+
+
+class Task(Protocol):
+    """What gives one robot its base commands."""
+
+    def command(self, position_xy_m: tuple[float, float], heading_rad: float) -> BodyVelocity:
+        """Base velocity in the body frame for the present pose; asked once a tick."""
+        ...
+
+
+# From a robot's route and a seed of its own.
+TaskFactory = Callable[[Route, int], Task]
+
+
+def go_to_goal(route: Route, _seed: int) -> Task:
+    """The paper's task, in which nothing is random."""
+    return GoToGoal(route)
 
 
 def routes(permutation: tuple[int, ...]) -> tuple[Route, ...]:
@@ -74,9 +93,14 @@ class GoToGoal:
             self._next += 1
             return self.command(position_xy_m, heading_rad)
         scale = min(_GAIN_PER_S, BASE_SPEED_MPS / distance_m) if distance_m > 0.0 else 0.0
-        cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
-        return BodyVelocity(
-            scale * (cosine * x_m + sine * y_m),
-            scale * (cosine * y_m - sine * x_m),
-            -_HEADING_GAIN_PER_S * math.remainder(heading_rad, math.tau),
-        )
+        return heading_held(scale * x_m, scale * y_m, heading_rad)
+
+
+def heading_held(vx_mps: float, vy_mps: float, heading_rad: float) -> BodyVelocity:
+    """A velocity in the world frame as a command in the body frame that turns the heading back to zero."""
+    cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
+    return BodyVelocity(
+        cosine * vx_mps + sine * vy_mps,
+        cosine * vy_mps - sine * vx_mps,
+        -_HEADING_GAIN_PER_S * math.remainder(heading_rad, math.tau),
+    )
