@@ -13,6 +13,10 @@ class LinkBusyError(MtmError):
     """The far end took a command not at all, or not whole, within the write bound; the link may still be sound."""
 
 
+class TakenOverError(MtmError):
+    """Somebody else, such as a pilot, has taken the robot over; whoever meets this must not open the link anew."""
+
+
 class Transport(ABC):
     """A link to one robot. As a context manager it opens the link, and leaving it always sends stop and closes.
 
@@ -35,6 +39,13 @@ class Transport(ABC):
     @abstractmethod
     def open(self) -> None:
         """Bring the link up and make the robot ready to move; raises MtmError when that fails."""
+
+    def resume(self) -> None:
+        """Open the link again after it was lost.
+
+        As `open`, except that a robot which was switched over in the meantime, by whomever, is left as it is.
+        """
+        self.open()
 
     @abstractmethod
     def send(self, velocity: BodyVelocity) -> None:

@@ -9,7 +9,7 @@ from typing import Any, Final
 from mtm_onboard.clock import Clock, SystemClock
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
-from mtm_onboard.transports.base import Transport
+from mtm_onboard.transports.base import TakenOverError, Transport
 from mtm_onboard.transports.mavlink_codec import MavlinkCodec
 from mtm_onboard.transports.mavlink_messages import (
     COMPANION_COMPONENT,
@@ -41,9 +41,9 @@ class MavlinkTransport(Transport):
     """One vehicle of the kind `profile` (rover, copter or px4) at `endpoint`, see `mavlink_ports.port_opener`.
 
     The pilot comes first. `open` refuses until the vehicle is in GUIDED (PX4: OFFBOARD) and armed; only with
-    `set_mode` and `arm` does it ask for these itself, and it waits `open_timeout_s` at most. A vehicle that leaves
-    the mode or disarms while it is driven has been taken over: from then on nothing but heartbeats is sent, `send`
-    raises MtmError, and only `open` begins anew. The vehicle is never disarmed, and never taken off or landed: `stop`
+    `set_mode` and `arm` does it ask for these itself, and it waits `open_timeout_s` at most. A vehicle that leaves the
+    mode or disarms while it is driven has been taken over: from then on nothing but heartbeats is sent, `send` raises
+    TakenOverError, and only `open` begins anew. The vehicle is never disarmed, and never taken off or landed: `stop`
     sends zero velocity, and the vehicle's own time-out (ArduPilot 3 s, PX4's COM_OF_LOSS_T 1 s) does the rest.
 
     With `signing_key_file` messages are signed both ways. `clock` must be the one whose time `service` is given, and
@@ -71,7 +71,8 @@ class MavlinkTransport(Transport):
         self._open_port = open_port or port_opener(endpoint, baud, self.write_bound_s / 2)
         self._place = endpoint or "the given port"
         self._target = target_system
-        self._may_set_mode, self._may_arm = set_mode, arm
+        self._set_mode, self._arm = set_mode, arm
+        self._may_set_mode = self._may_arm = False
         self._open_timeout_s = open_timeout_s
         key = None if signing_key_file is None else load_signing_key(Path(signing_key_file))
         self._is_signed = key is not None
@@ -111,6 +112,14 @@ class MavlinkTransport(Transport):
         Raises MtmError, with the wire closed, when the wire cannot be had, when no vehicle of the profile's kind is
         heard, and when it does not get into its mode or armed in time.
         """
+        self._open(self._set_mode, self._arm)
+
+    def resume(self) -> None:
+        """As `open`, but without asking for mode or arming: while the link was lost a pilot may have changed both."""
+        self._open(set_mode=False, arm=False)
+
+    def _open(self, set_mode: bool, arm: bool) -> None:
+        self._may_set_mode, self._may_arm = set_mode, arm
         with self._writing:
             self._is_engaged = self._is_taken_over = False
             if self._port is None:
@@ -129,9 +138,9 @@ class MavlinkTransport(Transport):
     def send(self, velocity: BodyVelocity) -> None:
         """Send one set-point.
 
-        Raises ValueError for values that are not finite, and MtmError when the link is not open, when somebody has
-        taken the vehicle over, when it has not been heard lately, when it cannot move that way and when the wire
-        fails.
+        Raises ValueError for values that are not finite or that the vehicle cannot have, TakenOverError when somebody
+        has taken it over, and MtmError when the link is not open, when the vehicle was not heard lately and when the
+        wire fails.
         """
         setpoint = self._setpoint(velocity)
         self._require_command(self._clock.now())
@@ -240,10 +249,10 @@ class MavlinkTransport(Transport):
             self._write(arm_request(messages, self._target, attempt))
 
     def _require_command(self, now_s: float) -> None:
-        """Raise MtmError when the link was not opened, when somebody else is in charge, and when nobody knows who."""
+        """Raise MtmError unless the link is open, and the vehicle was heard lately and has not been taken over."""
         vehicle = self._vehicle
         if self._is_taken_over:
-            raise MtmError(
+            raise TakenOverError(
                 f"The vehicle left {self._profile.mode} or was disarmed (its mode is {vehicle.mode}), so somebody has "
                 "taken it over; nothing more is sent until the link is opened anew."
             )

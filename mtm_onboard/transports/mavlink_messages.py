@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from mtm_onboard.motion import BodyVelocity
-from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.transports.mavlink_profiles import BODY_NED, Profile
 
 AUTOPILOT_COMPONENT: Final = 1  # MAV_COMP_ID_AUTOPILOT1
@@ -52,13 +51,13 @@ def companion_heartbeat(messages: Any) -> Any:
 def velocity_setpoint(messages: Any, profile: Profile, target_system: int, velocity: BodyVelocity, now_s: float) -> Any:
     """SET_POSITION_TARGET_LOCAL_NED with velocity and turn rate in the body's frame, all else ignored.
 
-    Raises ValueError for values that are not finite in 32 bits, and MtmError for a sideways speed that the vehicle
-    cannot have: dropping it would drop a part of the message that the motion carries.
+    Raises ValueError for values that are not finite in 32 bits, and for a sideways speed that the vehicle cannot have:
+    dropping it would drop a part of the message that the motion carries.
     """
     if not all(abs(value) <= _MOST_SINGLE for value in velocity):
         raise ValueError(f"the command {tuple(velocity)} is not finite in 32 bits; send speeds a vehicle can have")
     if velocity.vy_mps != 0.0 and not profile.is_holonomic:
-        raise MtmError(
+        raise ValueError(
             f"A {profile.name} cannot move sideways, and {velocity.vy_mps:g} m/s to the left were asked for; give its "
             "channel the axes vx and wz, and send base commands without vy."
         )

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.transports.base import LinkBusyError
 from mtm_onboard.transports.byte_link import ByteLink, serial_link, tcp_link
 
 _MOST_BYTES = 4096
@@ -89,6 +90,8 @@ class UdpPort:
             return
         try:
             self._socket.sendto(frame, self._peer)
+        except BlockingIOError as error:
+            raise LinkBusyError("The network takes no message right now; check the way to the vehicle.") from error
         except OSError as error:
             raise MtmError(f"The network refused a message ({error}); check the way to the vehicle.") from error
 

@@ -1,13 +1,19 @@
 """A MAVLink transport with the simulated vehicle at its far end, over a pipe and on one simulated clock."""
 
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from hil.clock import SimulatedClock
-from hil.robots.byte_pipe import PipeEnd, byte_pipe
+from hil.robots.byte_pipe import byte_pipe
 from hil.robots.mavlink_firmware import COPTER, PX4, ROVER
 from hil.robots.mavlink_vehicle import MavlinkVehicle
 from mtm_onboard.motion import STOP
+from mtm_onboard.protocol import MtmError
+from mtm_onboard.transports.byte_link import ByteLink
 from mtm_onboard.transports.mavlink import MavlinkTransport
+from mtm_onboard.transports.mavlink_ports import Port, StreamPort
 from tests.hil.robots.floating_plant import FloatingPlant
 from tests.onboard.transports.conformance import Rig
 
@@ -15,23 +21,27 @@ FIRMWARES = {"rover": ROVER, "copter": COPTER, "px4": PX4}
 FAKE_KEY = b"not a real secret, only for test"
 
 
-class RecordedEnd:
-    """A pipe's end that also keeps what is written, frame by frame."""
+class RecordedPort:
+    """A port that also keeps what is written, frame by frame; it refuses the next `refusing` writes."""
 
-    def __init__(self, end: PipeEnd) -> None:
+    def __init__(self, port: Port) -> None:
         self.frames: list[bytes] = []
-        self.end = end
-        self.read, self.keep_sender, self.close = end.read, end.keep_sender, end.close
+        self.refusing = 0
+        self.port = port
+        self.read, self.keep_sender, self.close = port.read, port.keep_sender, port.close
 
-    def write(self, data: bytes) -> None:
-        self.end.write(data)
-        self.frames.append(data)
+    def write(self, frame: bytes) -> None:
+        if self.refusing > 0:
+            self.refusing -= 1
+            raise MtmError("the wire refused a frame")
+        self.port.write(frame)
+        self.frames.append(frame)
 
 
 @dataclass
 class MavlinkRig(Rig):
     vehicle: MavlinkVehicle
-    wire: RecordedEnd
+    wire: RecordedPort
 
     def is_engaged(self):
         return self.vehicle.is_obeying
@@ -44,12 +54,14 @@ class MavlinkRig(Rig):
         self.clock.sleep_until(self.clock.now() + seconds)
 
 
-def mavlink_rig(profile="copter", *, vehicle=None, plant=None, **options) -> MavlinkRig:
-    """`vehicle` goes to the simulated vehicle, other options to the transport; both are ready to drive by default."""
-    clock = SimulatedClock()
-    plant = plant or FloatingPlant()
-    ours, theirs = byte_pipe()
-    wire = RecordedEnd(ours)
+def mavlink_rig(profile="copter", *, ports=None, vehicle=None, **options) -> MavlinkRig:
+    """`vehicle` goes to the simulated vehicle, other options to the transport; both are ready to drive by default.
+
+    `ports` are both ends of the wire, a pipe by default.
+    """
+    clock, plant = SimulatedClock(), FloatingPlant()
+    ours, theirs = ports or byte_pipe()
+    wire = RecordedPort(ours)
 
     def timestamp():
         return 10**12 + int(1e5 * clock.now())
@@ -60,4 +72,24 @@ def mavlink_rig(profile="copter", *, vehicle=None, plant=None, **options) -> Mav
     transport = MavlinkTransport(**(plain | options))
     clock.every(0.010, simulated.poll)
     clock.every(transport.service_period_s, transport.service)
-    return MavlinkRig(transport, simulated.controller, plant, clock, lambda: ours.sent, simulated, wire)
+    return MavlinkRig(
+        transport, simulated.controller, plant, clock, lambda: sum(map(len, wire.frames)), simulated, wire,
+        refuse=lambda writes: setattr(wire, "refusing", writes),
+    )  # fmt: skip
+
+
+@contextmanager
+def line_rig(profile="copter", **options) -> Iterator[MavlinkRig]:
+    """The same over a stream of the kernel's, which can be clogged."""
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        ports = [StreamPort(ByteLink(end.fileno(), lambda: None), 0.0025) for end in (ours, theirs)]
+        rig = mavlink_rig(profile, ports=ports, **options)
+
+        def clog():
+            with suppress(BlockingIOError):
+                while True:
+                    ours.send(bytes(4096))
+
+        rig.clog = clog
+        yield rig

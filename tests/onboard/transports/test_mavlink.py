@@ -4,11 +4,12 @@ import pytest
 
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.transports.base import TakenOverError
 from mtm_onboard.transports.factory import make_transport
 from mtm_onboard.transports.mavlink import MavlinkTransport
 from mtm_onboard.transports.mavlink_codec import MavlinkCodec
 from tests.onboard.transports.conformance import TransportConformance
-from tests.onboard.transports.mavlink_rig import FIRMWARES, mavlink_rig
+from tests.onboard.transports.mavlink_rig import FIRMWARES, line_rig, mavlink_rig
 from tests.onboard.transports.mavlink_spec import read_frames
 
 FORWARD = BodyVelocity(0.5, 0.0, 0.0)
@@ -19,6 +20,13 @@ class TestMavlinkCopterConforms(TransportConformance):
     @pytest.fixture
     def rig(self):
         return mavlink_rig("copter", vehicle={"goes_on": True})
+
+
+class TestMavlinkOverALineConforms(TransportConformance):
+    @pytest.fixture
+    def rig(self):
+        with line_rig("copter", vehicle={"goes_on": True}) as rig:
+            yield rig
 
 
 class TestMavlinkPx4Conforms(TransportConformance):
@@ -39,7 +47,7 @@ class TestMavlinkRoverConforms(TransportConformance):
         """A rover cannot, and says so instead of dropping a part of the motion."""
         with rig.transport:
             before = rig.wire_bytes()
-            with pytest.raises(MtmError, match="cannot move sideways, and 0.5 m/s"):
+            with pytest.raises(ValueError, match="cannot move sideways, and 0.5 m/s"):
                 rig.transport.send(BodyVelocity(0.0, 0.5, 0.0))
             assert rig.wire_bytes() == before
         assert rig.plant.position_xy_m == (0.0, 0.0)
@@ -125,8 +133,8 @@ def test_a_vehicle_of_another_kind_is_refused_at_once(profile, other):
 
 def test_a_silent_wire_is_refused_in_time():
     rig = mavlink_rig(open_timeout_s=3.0, endpoint="udpin:0.0.0.0:14550")
-    rig.wire.end.is_cut = True
-    rig.clock.every(100.0, lambda _: setattr(rig.wire.end, "is_cut", False), first_s=50.0)
+    rig.wire.port.is_cut = True
+    rig.clock.every(100.0, lambda _: setattr(rig.wire.port, "is_cut", False), first_s=50.0)
     assert "No heartbeat of system 1 came over udpin:0.0.0.0:14550 in 3 s" in refusal_of(rig)
 
 
@@ -151,17 +159,17 @@ def test_a_pilot_who_takes_over_is_never_fought(profile, way):
             rig.vehicle.pilot_switches(rig.vehicle.firmware.other_mode)
         else:
             rig.vehicle.pilot_disarms()
-        with pytest.raises(MtmError, match="somebody has taken it over"):
+        with pytest.raises(TakenOverError, match="somebody has taken it over"):
             rig.drive(FORWARD, 1.1)
         requests, written = list(rig.vehicle.requests), len(rig.wire.frames)
         for _ in range(50):
-            with pytest.raises(MtmError, match="taken it over"):
+            with pytest.raises(TakenOverError, match="taken it over"):
                 rig.transport.send(FORWARD)
             rig.run(0.02)
         rig.transport.stop()
         rig.vehicle.pilot_switches(rig.vehicle.firmware.guided_mode)
         rig.run(1.5)
-        with pytest.raises(MtmError, match="taken it over"):
+        with pytest.raises(TakenOverError, match="taken it over"):
             rig.transport.send(FORWARD)
         assert rig.transport.health()["taken_over"] is True
     assert set(names(rig.wire.frames[written:])) == {"HEARTBEAT"}
@@ -241,7 +249,7 @@ def test_alarms_are_counted_and_mere_information_is_not():
 def test_a_cut_wire_is_one_sentence_counted_and_a_stop_that_cannot_be_sent_says_so():
     rig = mavlink_rig()
     rig.transport.open()
-    rig.wire.end.is_cut = True
+    rig.wire.port.is_cut = True
     with pytest.raises(MtmError, match="the wire is cut"):
         rig.transport.send(FORWARD)
     assert rig.transport.health()["link_errors"] == 1
