@@ -47,7 +47,6 @@ class RunSettings:
     wire: Wire = "can"
     start_s: float = 1.5
     modulator: ModulatorFactory = Modulator
-    task: TaskFactory = go_to_goal
     plant: MecanumParameters = field(default_factory=calibrated_parameters)
     payload: Payload | None = None
     unix_s: float | None = None
