@@ -88,8 +88,15 @@ class CanStream:
         return self.parser.feed(data)
 
     def shutdown(self) -> None:
-        """Release the bus."""
-        self._bus.shutdown()
+        """Release the bus, also one that is gone."""
+        try:
+            self._bus.shutdown()
+        except self._errors:
+            # python-can leaves the port of an adapter that takes no farewell open, and plugged in again the adapter
+            # would come up under another name.
+            serial_port = getattr(self._bus, "serialPortOrig", None)
+            if serial_port is not None:
+                serial_port.close()
 
     def _is_quiet(self) -> bool:
         """Whether nothing waits behind the bus's file descriptor; False when it has none.
