@@ -50,6 +50,7 @@ class RunSettings:
     plant: MecanumParameters = field(default_factory=calibrated_parameters)
     payload: Payload | None = None
     unix_s: float | None = None
+    task: TaskFactory = go_to_goal
 
     def __post_init__(self) -> None:
         scheme = self.key.scheme
@@ -60,7 +61,7 @@ class RunSettings:
             )
         if len({channel.body for channel in scheme.channels}) != ROBOTS:
             raise MtmError("two channels of the key's scheme move the same body; give each robot one channel")
-        if not 0.0 <= self.start_s <= self.onset_s < self.seconds < np.inf:
+        if not (0.0 <= self.start_s and self.onset_s < self.seconds < np.inf):
             raise MtmError(
                 f"the run lasts {self.seconds:g} s and its message begins at {self.onset_s:g} s; make it last longer"
             )
