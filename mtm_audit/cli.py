@@ -6,6 +6,7 @@ Exit codes of `decode`: 0 decoded, 3 absent, 4 inconclusive, 1 error, 2 usage, 1
 import math
 import os
 from collections.abc import Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -17,6 +18,14 @@ app = typer.Typer(
     help="Find out what a robot said with its motion: from a recording and a key to a verdict.",
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
 )  # fmt: skip
+
+
+class StrategyName(StrEnum):
+    """How channels are used; repeated from the planner so that --help need not load it."""
+
+    SINGLE = "single"
+    SAME = "same"
+    SPLIT = "split"
 
 
 def _version(asked: bool) -> None:
@@ -109,6 +118,73 @@ def learn_profile(
 
         settings = DecodeSettings("matched", onset_s, assignment=pairs)
         run_profile(ProfileOptions(tuple(paths), key, out, tracker, settings))
+
+
+@app.command()
+def plan(
+    table: Annotated[
+        Path, typer.Argument(metavar="TABLE.csv", help="Measured accuracies: channel,M,t,successes,trials.")
+    ],
+    bits: Annotated[int, typer.Option(metavar="N", help="Bits that one message must carry.")],
+    accuracy: Annotated[float, typer.Option(metavar="SHARE", help="Messages to be right, such as 0.9.")] = 0.9,
+    rate: Annotated[
+        float | None, typer.Option(metavar="HZ", min=1e-3, help="Control rate, unless --like has it.")
+    ] = None,
+    like: Annotated[Path | None, typer.Option(metavar="KEY", help="A key of these robots: rate, band, noise.")] = None,
+    alphabet: Annotated[
+        list[int] | None, typer.Option(metavar="M", help="Alphabet size to consider; may be repeated (default: all).")
+    ] = None,
+    measured_only: Annotated[
+        bool, typer.Option("--measured-only", help="Search measured points alone, as the paper does.")
+    ] = False,
+    check: Annotated[
+        Path | None, typer.Option(metavar="TABLE.csv", help="Compare with accuracies of other recordings.")
+    ] = None,
+    strategy: Annotated[StrategyName | None, typer.Option(help="Which scheme to write (default: the fastest).")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help="Scheme file for mtm-onboard keygen --scheme.")
+    ] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw accuracy over T.")] = None,
+) -> None:
+    """Find the fastest scheme for a payload and a target accuracy, from measured accuracies (docs/planning.md).
+
+    Exit codes: 0 planned, 4 planned but --check disagrees, 1 error, 2 usage, 130 interrupted.
+    """  # fmt: skip
+    if rate is None and like is None:
+        raise typer.BadParameter("give the control rate, or a key that has it with --like", param_hint="--rate")
+    if rate is not None and like is not None:
+        raise typer.BadParameter("--like has a rate already; leave out --rate", param_hint="--rate")
+    with reported("mtm-audit", "nothing was written"):
+        from mtm_audit.commands.plan import PlanOptions, run_plan
+        from mtm_audit.planning.plan import Problem
+
+        problem = Problem(bits, accuracy, tuple(alphabet) if alphabet else None, measured_only)
+        chosen = None if strategy is None else strategy.value
+        code = run_plan(PlanOptions(table, problem, rate, like, chosen, check, plot, out))
+    raise typer.Exit(code)
+
+
+@app.command()
+def duration(
+    table: Annotated[Path, typer.Argument(metavar="TABLE.csv", help="Measured accuracies of the key's robots.")],
+    key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
+    accuracy: Annotated[float, typer.Option(metavar="SHARE", help="Messages to be right, such as 0.9.")] = 0.9,
+    bits: Annotated[int | None, typer.Option(metavar="N", help="Bits to carry (default: all of a message).")] = None,
+) -> None:
+    """Say how long a recording must be for a key's message to be read with the wanted accuracy."""
+    with reported("mtm-audit", "nothing was written"):
+        from mtm_audit.commands.duration import run_duration
+
+        run_duration(key, table, bits, accuracy)
+
+
+@app.command()
+def overhead() -> None:
+    """Print what Reed-Solomon codes cost: factors on the time per goal, as in the paper."""
+    with reported("mtm-audit", "nothing was written"):
+        from mtm_audit.commands.overhead import run_overhead
+
+        run_overhead()
 
 
 def _onset_s(text: str) -> float | None:

@@ -1,0 +1,45 @@
+"""Whether a prediction holds on a table that was measured on other recordings."""
+
+from dataclasses import dataclass
+
+from mtm_audit.planning.curve import fit_curve
+from mtm_audit.planning.plan import Plan
+from mtm_audit.planning.table import AccuracyTable
+from mtm_onboard.protocol.errors import MtmError
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A plan beside what held-out measurements make of the same scheme (`measured`, with its own interval)."""
+
+    plan: Plan
+    measured: Plan
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the two 95 % intervals of the message's accuracy overlap."""
+        (low, high), (other_low, other_high) = self.plan.interval, self.measured.interval
+        return low <= other_high and other_low <= high
+
+
+def check(plan: Plan, held_out: AccuracyTable) -> Checked:
+    """Evaluate the plan's scheme on the held-out table.
+
+    Points of exactly the plan's windows are taken as they are; otherwise the table's own curve is interpolated.
+    Raises MtmError that names the windows to measure when the held-out table does not reach them.
+    """
+    parts = []
+    for curve, count in plan.parts:
+        window_ticks = plan.message_ticks // count
+        points = held_out.points_of(curve.channel, plan.alphabet_size)
+        exact = [point for point in points if point.window_ticks == window_ticks]
+        own = fit_curve(exact or points, measured_only=bool(exact)) if points else None
+        if own is None or not own.exists_at(window_ticks):
+            raise MtmError(
+                f"the held-out table says nothing of {curve.channel} at M = {plan.alphabet_size} in windows of "
+                f"{window_ticks} ticks; measure that cell, or leave out --check"
+            )
+        parts.append((own, count))
+    return Checked(
+        plan, Plan(plan.strategy, plan.alphabet_size, plan.message_ticks, tuple(parts), plan.exact)
+    )  # fmt: skip

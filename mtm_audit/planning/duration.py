@@ -1,0 +1,94 @@
+"""How long a recording must be for a key's scheme to be read with a wanted accuracy."""
+
+from dataclasses import dataclass
+
+from mtm_audit.planning.curve import Curve
+from mtm_audit.planning.plan import Plan
+from mtm_audit.planning.search import curves_of
+from mtm_audit.planning.table import AccuracyTable, members_of, pooled_name
+from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.framing import payload_bits
+from mtm_onboard.protocol.scheme import Scheme
+
+_MOST_REPEATS = 10_000
+
+
+@dataclass(frozen=True)
+class Duration:
+    """How much motion to record. `repeats`: whole messages; `accuracy` and `interval` are those of all of them pooled.
+
+    `from_start_s` suffices when the recording begins with a message; `anywhere_s` holds whole repeats of every window
+    wherever in a message it begins.
+    """
+
+    repeats: int
+    from_start_s: float
+    anywhere_s: float
+    accuracy: float
+    interval: tuple[float, float]
+
+
+def required_duration(scheme: Scheme, table: AccuracyTable, bits: int, target_accuracy: float) -> Duration:
+    """The shortest recording that has the target accuracy.
+
+    r repeats of a window of t ticks count as one window of r t ticks, since detectors add up what repeats say; so the
+    table must reach r t, and nothing is extrapolated. Error correction of the scheme's framing is not counted.
+    Raises MtmError when the payload does not fit the key's scheme, when the table lacks its channels or alphabet, or
+    when the longest windows of the table do not suffice.
+    """
+    if not 0.0 < target_accuracy < 1.0:
+        raise MtmError(f"the target accuracy is {target_accuracy:g}; choose one above 0 and below 1")
+    holds = payload_bits(scheme) if scheme.framing is None else scheme.framing.payload_bits
+    if not 1 <= bits <= holds:
+        raise MtmError(f"a payload of {bits} bits does not fit: a message of this key carries 1 to {holds} bits")
+    parts = _parts(scheme, table)
+    best: Plan | None = None
+    for repeats in range(1, _MOST_REPEATS):
+        ticks = repeats * scheme.message_ticks
+        windows = [ticks // count for _, count in parts]
+        if any(window > int(curve.window_ticks[-1]) for (curve, _), window in zip(parts, windows, strict=True)):
+            break
+        if any(not curve.exists_at(window) for (curve, _), window in zip(parts, windows, strict=True)):
+            continue
+        plan = Plan("split", scheme.alphabet_size, ticks, parts, exact=True)
+        if plan.accuracy >= target_accuracy:
+            longest = max(scheme.window_ticks(channel) for channel in scheme.channels)
+            return Duration(
+                repeats, ticks / scheme.rate_hz, (ticks + longest) / scheme.rate_hz, plan.accuracy, plan.interval
+            )
+        best = plan if best is None or plan.accuracy > best.accuracy else best
+    raise MtmError(_too_short(scheme, parts, best, target_accuracy))
+
+
+def _parts(scheme: Scheme, table: AccuracyTable) -> tuple[tuple[Curve, int], ...]:
+    curves = {
+        frozenset(members_of(curve.channel)): curve
+        for curve in curves_of(table, scheme.alphabet_size, measured_only=False)
+    }
+    names = [channel.name for channel in scheme.channels]
+    if scheme.combine == "same" and len(names) > 1:
+        wanted = [(pooled_name(names), scheme.message_symbols)]
+    else:
+        wanted = [(channel.name, channel.symbols) for channel in scheme.channels]
+    for name, _ in wanted:
+        if frozenset(members_of(name)) not in curves:
+            known = ", ".join(table.channels)
+            raise MtmError(
+                f"the table has no {name} at M = {scheme.alphabet_size}, which this key uses; measure it (the table "
+                f"has {known} at M = {', '.join(map(str, table.alphabet_sizes))})"
+            )
+    return tuple((curves[frozenset(members_of(name))], count) for name, count in wanted)
+
+
+def _too_short(scheme: Scheme, parts: tuple[tuple[Curve, int], ...], best: Plan | None, target: float) -> str:
+    if best is None:
+        curve, count = parts[0]
+        return (
+            f"the table has windows of {curve.window_ticks[0]} to {curve.window_ticks[-1]} ticks for {curve.channel}, "
+            f"and no number of repeats of this key's {scheme.message_ticks // count} lies within that for every "
+            f"channel; measure {scheme.message_ticks // count} and multiples of it"
+        )
+    return (
+        f"the longest windows of the table give {best.accuracy:.3g} with {best.message_ticks // scheme.message_ticks} "
+        f"repeats, not {target:g}; lower the target, or measure longer windows"
+    )
