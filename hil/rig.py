@@ -20,7 +20,7 @@ from mtm_onboard.protocol.framing import Payload
 from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.runtime import NoiseAdder
 
-Wire = Literal["can", "direct"]
+Wire = Literal["can", "plaintext", "direct"]
 # Codebook, channel name and, as `Modulator` takes them, the channel's own symbols or a message that changes them.
 ModulatorFactory = Callable[[Codebook, str, Any], NoiseAdder]
 
@@ -61,7 +61,7 @@ class RunSettings:
             )
         if len({channel.body for channel in scheme.channels}) != ROBOTS:
             raise MtmError("two channels of the key's scheme move the same body; give each robot one channel")
-        if not (0.0 <= self.start_s and self.onset_s < self.seconds < np.inf):
+        if not (self.start_s >= 0.0 and self.onset_s < self.seconds < np.inf):
             raise MtmError(
                 f"the run lasts {self.seconds:g} s and its message begins at {self.onset_s:g} s; make it last longer"
             )

@@ -24,6 +24,7 @@ Table = dict[str, Any]
 LONGEST_BYTES = 16_384
 _DEADLINE_S = 2.0
 _MOST_CONNECTIONS = 8
+_BACKLOG = 64
 # Bounds what a flood of connections costs the loop's process.
 _ACCEPT_PAUSE_S = 0.01
 _POLL_S = 0.2
@@ -47,7 +48,7 @@ class ControlSocket:
             self._listener.bind(str(path))
             os.chmod(path, 0o600)
             self._identity = _identity(path)
-            self._listener.listen(_MOST_CONNECTIONS)
+            self._listener.listen(_BACKLOG)
         except OSError as error:
             self._listener.close()
             reason = error.strerror or error
@@ -109,12 +110,12 @@ class ControlSocket:
 
 def ask(path: Path, request: Table) -> Table:
     """The answer of the robot that listens at `path`; raises MtmError when there is none or it says that it cannot."""
+    deadline_s = time.monotonic() + _CLIENT_PATIENCE_S
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-            connection.settimeout(_CLIENT_PATIENCE_S)
-            connection.connect(str(path))
+            _connect(connection, path, deadline_s)
             connection.sendall(json.dumps(request).encode() + b"\n")
-            line = _read_line(connection, time.monotonic() + _CLIENT_PATIENCE_S)
+            line = _read_line(connection, deadline_s)
     except OSError as error:
         raise MtmError(
             f"no running robot answers at {path} ({error.strerror or error}); start mtm-onboard run with "
@@ -123,11 +124,24 @@ def ask(path: Path, request: Table) -> Table:
     try:
         answer = json.loads(line)
         ok = answer.pop("ok")
-    except (ValueError, AttributeError, KeyError) as error:
+    except (ValueError, TypeError, AttributeError, KeyError) as error:
         raise MtmError(f"what listens at {path} gave no answer of a robot; check the path") from error
     if not ok:
         raise MtmError(str(answer.get("error")))
     return dict(answer)
+
+
+def _connect(connection: socket.socket, path: Path, deadline_s: float) -> None:
+    connection.settimeout(_CLIENT_PATIENCE_S)
+    while True:
+        try:
+            connection.connect(str(path))
+            return
+        except BlockingIOError:
+            # A queue that is full refuses at once whoever has a timeout.
+            if time.monotonic() > deadline_s:
+                raise
+            time.sleep(_ACCEPT_PAUSE_S)
 
 
 def _answered(line: bytes, answer: Callable[[Table], Table]) -> Table:
