@@ -8,14 +8,17 @@ from mtm_onboard.journal import Journal
 from mtm_onboard.loop import LoopStats, run_loop
 from mtm_onboard.motion import BodyVelocity
 from mtm_onboard.runtime import NoiseAdder, Runtime
-from mtm_onboard.source import HeldSource
+from mtm_onboard.source import HeldSource, Source
 from mtm_onboard.transports.base import Transport
 
 RATE_HZ = 50.0
 
 
 class Driven:
-    """`transport` is open and served on `clock`; tick 0 was at the clock's start."""
+    """`transport` is open and served on `clock`; tick 0 was at the clock's start.
+
+    Base commands come from `source` when it is given, else from what `run` is told.
+    """
 
     def __init__(
         self,
@@ -25,13 +28,14 @@ class Driven:
         limits: Limits | None = None,
         staleness: Staleness | None = None,
         journal: Journal | None = None,
+        source: Source | None = None,
     ) -> None:
         self.clock = clock
         self.source = HeldSource()
         limits, staleness = limits or Limits(1.0, 2.0), staleness or Staleness()
         self.guard = Guard(limits, staleness, noise_sigma=0.1, period_s=1.0 / RATE_HZ)
         self.stats = LoopStats()
-        self._runtime = Runtime(modulator, self.guard, self.source, transport, journal)
+        self._runtime = Runtime(modulator, self.guard, source or self.source, transport, journal)
 
     def run(self, seconds: float, base: BodyVelocity | None = None, stop: Callable[[], bool] = lambda: False) -> None:
         """Tick for so long, with a fresh base command in each tick, or none."""
