@@ -23,6 +23,7 @@ class WireName(StrEnum):
     """What lies between the onboard software and a simulated robot."""
 
     CAN = "can"
+    PLAINTEXT = "plaintext"
     DIRECT = "direct"
 
 
@@ -46,9 +47,7 @@ def record(
     no_message: Annotated[bool, typer.Option("--no-message", help="Move without a message.")] = False,
     seconds: Annotated[float, typer.Option(help="Length of the recording.")] = 26.0,
     key: Annotated[Path | None, typer.Option(help="The key file; one is made in the folder without it.")] = None,
-    wire: Annotated[
-        WireName, typer.Option(help="The whole CAN protocol, or the same motion without it.")
-    ] = WireName.CAN,
+    wire: Annotated[WireName, typer.Option(help="The robots' CAN or plaintext protocol, or no wire.")] = WireName.CAN,
     seed: Annotated[int, typer.Option(min=0, help="Decides everything random but the message's waveforms.")] = 0,
     camera: Annotated[CameraName, typer.Option(help="Which camera films.")] = CameraName.OVERHEAD,
     no_video: Annotated[bool, typer.Option("--no-video", help="Motion capture alone.")] = False,

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.clock import SimulatedClock
-from hil.rig import LIMITS, SAMPLE_PERIOD_S, RobotReport, RunResult, RunSettings, seeds_of
+from hil.rig import LIMITS, SAMPLE_PERIOD_S, RobotReport, RunResult, RunSettings, Wire, seeds_of
 from hil.robots.can_line import can_line
 from hil.robots.can_node import CanMotionController
 from hil.robots.direct import DirectTransport
 from hil.robots.mecanum import MecanumPlant
 from hil.robots.motion_controller import MotionController
+from hil.robots.plaintext_line import plaintext_line
+from hil.robots.plaintext_node import PlaintextMotionController
 from hil.sensors.poses import Floats, Trajectory
 from hil.worlds.robomaster import Route, Task, routes
 from mtm_onboard.guard import Guard, Staleness
@@ -33,11 +35,12 @@ _SETTLING_S = 0.05
 
 @dataclass(frozen=True)
 class _Link:
-    """The wire to one robot: its transport, what its far end does each period, and what it found wrong."""
+    """The wire to one robot: its transport, what its far end does each period, what it found wrong, and its end."""
 
     transport: Transport
     poll: Callable[[float], None]
     faults: Callable[[], int]
+    shutdown: Callable[[], None]
 
 
 @dataclass(frozen=True)
@@ -66,12 +69,20 @@ class _Robot:
 
 
 def run_lockstep(settings: RunSettings) -> RunResult:
-    """Run the world and return its motion; the same settings give the same result, bit for bit, over either wire.
+    """Run the world and return its motion.
 
-    Raises MtmError when a robot's link fails.
+    The same settings give the same result, bit for bit, over CAN and without a wire; in plaintext commands are rounded
+    to 0.1 mm/s and 0.001 deg/s. Raises MtmError when a robot's link fails.
     """
-    clock, scheme = SimulatedClock(), settings.key.scheme
-    robots = _robots(settings, clock)
+    clock = SimulatedClock()
+    with ExitStack() as wires:
+        robots = _robots(settings, clock)
+        for robot in robots:
+            wires.callback(robot.link.shutdown)
+        return _run(settings, clock, robots)
+
+
+def _run(settings: RunSettings, clock: SimulatedClock, robots: list[_Robot]) -> RunResult:
     poses = array("d")
     polls = [(robot.link.poll, robot.plant) for robot in robots]
 
@@ -92,7 +103,7 @@ def run_lockstep(settings: RunSettings) -> RunResult:
         samples = len(poses)
     clock.sleep_until(settings.seconds + _SETTLING_S)
     motion = np.frombuffer(poses[:samples], dtype=np.float64).reshape(-1, len(robots), 3)
-    names = [channel.body for channel in scheme.channels]
+    names = [channel.body for channel in settings.key.scheme.channels]
     return RunResult(_trajectories(names, motion), settings.onset_s, tuple(robot.report(stats) for robot in robots))
 
 
@@ -109,7 +120,7 @@ def _opened(transports: list[Transport], clock: SimulatedClock) -> Iterator[None
     with ExitStack() as stack:
         for transport in transports:
             stack.enter_context(transport)
-            if isinstance(transport, RoboMasterCan):
+            if not isinstance(transport, DirectTransport):
                 clock.every(transport.service_period_s, transport.service)
         yield
 
@@ -129,8 +140,7 @@ def _robot(
     route: Route,
 ) -> _Robot:
     plant = MecanumPlant(settings.plant, slip_seed, route.start_xy_m)
-    controller = MotionController(plant)
-    link = _can_link(controller) if settings.wire == "can" else _direct_link(controller, clock)
+    controller, link = _wired(settings.wire, plant, clock)
     source = HeldSource()
     period_s = 1.0 / settings.key.scheme.rate_hz
     guard = Guard(LIMITS, Staleness(), noise_sigma=channel.sigma, period_s=period_s)
@@ -147,6 +157,14 @@ def _modulator(settings: RunSettings, channel: Channel, message: Message) -> Noi
     return settings.modulator(codebook, channel.name, own)
 
 
+def _wired(wire: Wire, plant: MecanumPlant, clock: SimulatedClock) -> tuple[MotionController, _Link]:
+    if wire == "plaintext":
+        controller = MotionController(plant, deadman_s=None)  # as the robot has none on this wire
+        return controller, _plaintext_link(controller)
+    controller = MotionController(plant)
+    return controller, _can_link(controller) if wire == "can" else _direct_link(controller, clock)
+
+
 def _can_link(controller: MotionController) -> _Link:
     ours, theirs = can_line()
     node, transport = CanMotionController(controller, theirs), RoboMasterCan(ours)
@@ -157,11 +175,21 @@ def _can_link(controller: MotionController) -> _Link:
             wrong + transport.bus_errors + transport.refusals + transport.malformed_pushes + transport.missed_heartbeats
         )
 
-    return _Link(transport, node.poll, faults)
+    return _Link(transport, node.poll, faults, node.shutdown)
+
+
+def _plaintext_link(controller: MotionController) -> _Link:
+    transport, port = plaintext_line()
+    node = PlaintextMotionController(controller, [port])
+
+    def faults() -> int:
+        return node.faults + controller.faults + transport.refusals + transport.malformed + transport.link_errors
+
+    return _Link(transport, node.poll, faults, node.shutdown)
 
 
 def _direct_link(controller: MotionController, clock: SimulatedClock) -> _Link:
-    return _Link(DirectTransport(controller, clock), controller.advance, lambda: controller.faults)
+    return _Link(DirectTransport(controller, clock), controller.advance, lambda: controller.faults, lambda: None)
 
 
 def _trajectories(names: list[str], motion: Floats) -> tuple[Trajectory, ...]:

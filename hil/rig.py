@@ -34,10 +34,10 @@ class RunSettings:
 
     `symbols` is the whole message, or `payload` what a scheme with framing sends; both are None when the robots move
     without one. The run begins at `unix_s`, and under the rolling schedule its message with the first slot from
-    `start_s` on, see `onset_s`; None has slot 0 begin at `start_s`. `wire` "can" is the whole CAN protocol in
-    both directions, "direct" gives the same motion without it. `modulator` may put something else, such as the C shim,
-    in the place of the Python one, and `task` other work in the place of the paper's. Raises MtmError when the key does
-    not fit this world or the spans make no sense.
+    `start_s` on, see `onset_s`; None has slot 0 begin at `start_s`. `wire` "can" is the whole CAN protocol in both
+    directions, "direct" gives the same motion without it, and "plaintext" is the EP's text protocol, which rounds
+    commands. `modulator` may put something else, such as the C shim, in the place of the Python one, and `task` other
+    work in the place of the paper's. Raises MtmError when the key does not fit this world or the spans make no sense.
     """
 
     key: Key

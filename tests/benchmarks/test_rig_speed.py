@@ -8,7 +8,7 @@ from tests.hil.fleet import fake_key, short_run
 SECONDS = 10.0
 
 
-@pytest.mark.parametrize(("wire", "at_least"), [("can", 5.0), ("direct", 100.0)])
+@pytest.mark.parametrize(("wire", "at_least"), [("can", 5.0), ("plaintext", 5.0), ("direct", 100.0)])
 def test_four_robots_run_faster_than_real_time(benchmark, wire, at_least):
     settings = short_run(key=fake_key(600), seconds=SECONDS, wire=wire)
     benchmark.pedantic(run_lockstep, args=(settings,), rounds=5, warmup_rounds=1)

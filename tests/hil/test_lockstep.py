@@ -19,7 +19,14 @@ def test_the_can_bus_and_no_wire_at_all_give_the_same_motion_bit_for_bit():
     assert np.ptp(motion(direct)[:, :, 0], axis=1).min() > 0.3
 
 
-@pytest.mark.parametrize("wire", ["can", "direct"])
+def test_in_plaintext_the_motion_is_the_same_up_to_the_rounding_of_commands():
+    direct, plaintext = (motion(run_lockstep(short_run(wire=wire))) for wire in ("direct", "plaintext"))
+    difference = np.abs(plaintext - direct)
+    assert 0.0 < difference[:, :, :2].max() < 5e-4
+    assert difference[:, :, 2].max() < 1e-3
+
+
+@pytest.mark.parametrize("wire", ["can", "plaintext", "direct"])
 def test_a_run_ends_with_every_robot_stopped_and_nothing_wrong(wire):
     result = run_lockstep(short_run(wire=wire))
     assert all(robot.is_clean for robot in result.robots), result.robots
