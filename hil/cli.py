@@ -52,7 +52,7 @@ def record(
     camera: Annotated[CameraName, typer.Option(help="Which camera films.")] = CameraName.OVERHEAD,
     no_video: Annotated[bool, typer.Option("--no-video", help="Motion capture alone.")] = False,
     realtime: Annotated[
-        bool, typer.Option("--realtime", help="Run the onboard programs in processes of their own, on serial adapters.")
+        bool, typer.Option("--realtime", help="Run the onboard programs in processes of their own, on serial devices.")
     ] = False,
 ) -> None:
     """Record four simulated robots: motion capture, video, and what was sent."""
@@ -150,6 +150,38 @@ def robustness(
         from hil.commands.robustness import robustness as run
 
         run(rollouts, seed, workers, out, cells, console)
+
+
+@app.command()
+def sweep(
+    world: Annotated[str, typer.Argument(metavar="WORLD", help="The world to measure: robomaster.")],
+    out: Annotated[Path, typer.Option(help="The accuracy table to write, for mtm-audit plan.")],
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each M and window.")] = 40,
+    alphabet: Annotated[list[int], typer.Option(metavar="M", help="Alphabet size; may be repeated.")] = [4, 16, 64],  # noqa: B006
+    window: Annotated[list[int], typer.Option(metavar="TICKS", min=1, help="Window length; may be repeated.")] = [
+        25,
+        50,
+        75,
+        100,
+        150,
+    ],  # noqa: B006
+    scheme: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Measure this scheme's own windows, and whole messages.")
+    ] = None,
+    detector: Annotated[str, typer.Option(help="Which detector decodes: matched or coherency.")] = "matched",
+    first_seed: Annotated[int, typer.Option(min=0, help="The first rollout's seed.")] = 700_000,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
+    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/sweep.jsonl"),
+) -> None:
+    """Measure how often a symbol is right, by channel, alphabet size and window length."""  # fmt: skip
+    with _reported() as console:
+        from hil.commands.sweep import SweepOptions
+        from hil.commands.sweep import sweep as run
+
+        options = SweepOptions(
+            world, rollouts, tuple(alphabet), tuple(window), scheme, detector, first_seed, workers, out, cells
+        )
+        run(options, console)
 
 
 paper = typer.Typer(help="The paper's tables, measured on the simulated robots.", no_args_is_help=True)

@@ -1,4 +1,4 @@
-"""`mtm-onboard run` in a process of its own, on a serial CAN adapter that is simulated."""
+"""`mtm-onboard run` in a process of its own, on a serial device that is simulated."""
 
 import socket
 import subprocess
@@ -8,8 +8,7 @@ import numpy as np
 
 from hil.programs import program
 from hil.rig import LIMITS, RobotReport
-from hil.robots.can_node import CanMotionController
-from hil.robots.slcan_port import SlcanPort
+from hil.serial_wires import SerialWire
 from mtm_onboard.motion import STOP
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.journal_file import CLAMPED, REFUSED, STALE, JournalRecord, read_journal
@@ -22,10 +21,7 @@ name = "{name}"
 channel = "{channel}"
 
 [transport]
-kind = "robomaster-can"
-interface = "slcan"
-channel = "{port}"
-sleep_after_open = 0
+{transport}
 
 [limits]
 speed_mps = {speed_mps}
@@ -46,12 +42,13 @@ class OnboardProcess:
     `arguments` are what `mtm-onboard run` takes beside its configuration. Base commands are taken at `udp_port`.
     """
 
-    def __init__(self, folder: Path, name: str, channel: str, port: SlcanPort, arguments: list[str]) -> None:
+    def __init__(self, folder: Path, name: str, channel: str, wire: SerialWire, arguments: list[str]) -> None:
         self.name = name
         self.udp_port = _free_udp_port()
         self._folder = folder
+        self._wire = wire
         config = _CONFIG.format(
-            name=name, channel=channel, port=port.path, udp_port=self.udp_port, speed_mps=LIMITS.speed_mps,
+            name=name, channel=channel, transport=wire.transport, udp_port=self.udp_port, speed_mps=LIMITS.speed_mps,
             turn_rate_radps=LIMITS.turn_rate_radps,
         )  # fmt: skip
         (folder / f"{name}.toml").write_text(config, encoding="utf-8")
@@ -84,19 +81,18 @@ class OnboardProcess:
                 self._process.kill()
         self._process.wait()
 
-    def report(self, node: CanMotionController) -> RobotReport:
+    def report(self) -> RobotReport:
         """What its journal and the robot's end of the wire tell, after it has ended.
 
         Raises MtmError when the journal lacks rows or shows a tick that was sent twice.
         """
         journal = read_journal(self._folder / f"{self.name}.csv")
         sent, missed = check_ticks(self.name, journal)
-        flags, controller = journal.flags, node.controller
+        flags, controller = journal.flags, self._wire.controller
         clamped, stale, refused = (int(np.count_nonzero(flags & bit)) for bit in (CLAMPED, STALE, REFUSED))
         median_s, late_s = np.quantile(journal.lateness_s, (0.5, 0.99))
         return RobotReport(
-            self.name, sent, missed, clamped, stale, refused,
-            node.faults + node.ignored_messages + node.malformed_messages + node.bus_errors,
+            self.name, sent, missed, clamped, stale, refused, self._wire.faults(),
             controller.deadman_stops, not controller.work_mode and controller.demand == STOP,
             (float(median_s), float(late_s)),
         )  # fmt: skip

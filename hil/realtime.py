@@ -1,11 +1,12 @@
 """A run in real time: every robot's onboard runtime in a process of its own, the simulated robots in this one.
 
-The onboard programs meet serial CAN adapters and a UDP port, as on a robot, and start their message at a common
+The onboard programs meet serial devices and a UDP port, as on a robot, and start their message at a common
 instant. This process is the robots' motion controllers, the chassis, and the controller that sends base commands.
 """
 
 import time
 from array import array
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,11 +15,9 @@ import numpy as np
 
 from hil.onboard_process import OnboardProcess
 from hil.rig import SAMPLE_PERIOD_S, RunResult, RunSettings, seeds_of
-from hil.robots.can_node import CanMotionController
 from hil.robots.mecanum import MecanumPlant
-from hil.robots.motion_controller import MotionController
-from hil.robots.slcan_port import SlcanPort
 from hil.sensors.poses import Trajectory
+from hil.serial_wires import serial_wire
 from hil.worlds.robomaster import GoToGoal, routes
 from mtm_onboard.client import BaseCommandClient
 from mtm_onboard.clock import SystemClock
@@ -40,7 +39,7 @@ _EARLY_S = 0.5
 class _Robot:
     """One simulated robot, its task controller, and the program that drives it."""
 
-    node: CanMotionController
+    poll: Callable[[float], None]
     plant: MecanumPlant
     task: GoToGoal
     process: OnboardProcess
@@ -53,7 +52,7 @@ class _Robot:
 def run_realtime(settings: RunSettings, key_file: Path, folder: Path) -> RunResult:
     """Run for `settings.seconds` of real time; configurations, journals and outputs of the programs go to `folder`.
 
-    `key_file` holds `settings.key`; the plants' wire is the CAN protocol over a pseudo-terminal. Raises MtmError when
+    `key_file` holds `settings.key`; the wire is a UART in plaintext or a serial CAN adapter. Raises MtmError when
     a program fails, starts too late or sends a tick twice.
     """
     clock = SystemClock()
@@ -66,7 +65,7 @@ def run_realtime(settings: RunSettings, key_file: Path, folder: Path) -> RunResu
             if robot.process.is_running:
                 raise MtmError(f"mtm-onboard of {robot.process.name} did not end in time; run it again")
             robot.process.check(may_have_ended=True)
-        reports = tuple(robot.process.report(robot.node) for robot in robots)
+        reports = tuple(robot.process.report() for robot in robots)
     poses = np.frombuffer(motion, dtype=np.float64).reshape(-1, len(robots), 3)
     instants_s = np.frombuffer(times_s, dtype=np.float64)
     trajectories = tuple(
@@ -101,7 +100,7 @@ def _drive(
         nonlocal last
         since_s = now_s - began_s
         for robot in robots:
-            robot.node.poll(since_s)
+            robot.poll(since_s)
         if tick * SAMPLE_PERIOD_S <= settings.seconds + 1e-6:
             # The chassis stands where its last whole step, that of this tick, has brought it.
             times_s.append(tick * SAMPLE_PERIOD_S)
@@ -147,12 +146,11 @@ def _robots(settings: RunSettings, arguments: list[str], folder: Path, stack: Ex
         settings.key.scheme.channels, seeds.slips, routes(seeds.permutation()), strict=True
     ):
         plant = MecanumPlant(settings.plant, slip, route.start_xy_m)
-        port = SlcanPort()
-        stack.callback(port.shutdown)
-        process = OnboardProcess(folder, channel.body, channel.name, port, arguments)
+        wire = serial_wire(settings.wire, plant)
+        stack.callback(wire.shutdown)
+        process = OnboardProcess(folder, channel.body, channel.name, wire, arguments)
         stack.callback(process.end)
         client = BaseCommandClient(process.udp_port)
         stack.callback(client.close)
-        node = CanMotionController(MotionController(plant), port)
-        robots.append(_Robot(node, plant, GoToGoal(route), process, client))
+        robots.append(_Robot(wire.poll, plant, GoToGoal(route), process, client))
     return robots

@@ -39,8 +39,9 @@ def test_a_journal_that_shows_a_failed_run_is_refused(record, sentence):
 
 
 @pytest.mark.realtime
-def test_four_onboard_programs_drive_four_robots_through_serial_adapters(tmp_path):
-    settings = short_run(key=fake_key(100), seconds=6.0, start_s=3.5)
+@pytest.mark.parametrize("wire", ["can", "plaintext"])
+def test_four_onboard_programs_drive_four_robots_through_serial_devices(tmp_path, wire):
+    settings = short_run(key=fake_key(100), seconds=6.0, start_s=3.5, wire=wire)
     save_key(settings.key, tmp_path / "robot.key")
     result = run_realtime(settings, tmp_path / "robot.key", tmp_path)
     assert [robot.name for robot in result.robots] == ["robot0", "robot1", "robot2", "robot3"]
