@@ -25,7 +25,8 @@ class ReconnectingTransport(Transport):
     A `send` or `service` that fails takes the link down, as do several `LinkBusyError` in a row. While it is down,
     `send` returns at once, counted in `dropped`; `service` tells the robot to stop, releases the old link, and tries
     to open a new one after 0.1 s, then after pauses that double up to 5 s. Only `service` waits for any of that.
-    After `give_up_s` without a link that holds `send` raises MtmError.
+    After `give_up_s` without a link that holds `send` raises MtmError. A robot that somebody else has taken over is no
+    lost link: TakenOverError goes to whoever called.
 
     That nothing moves before a base command has come over the new link is the runtime's part, see `up_since_s`.
     """
@@ -126,11 +127,16 @@ class ReconnectingTransport(Transport):
             link.close()
 
     def service(self, now_s: float) -> None:
-        """Serve the link; when it is down, stop and release it, and open a new one when that is due."""
+        """Serve the link; when it is down, stop and release it, and open a new one when that is due.
+
+        Raises TakenOverError when somebody else has taken the robot over.
+        """
         link = self._link
         if link is not None and self.up_since_s is not None:
             try:
                 link.service(now_s)
+            except TakenOverError:
+                raise
             except Exception as error:
                 self._lose(link, error)
         elif link is not None:
@@ -175,6 +181,8 @@ class ReconnectingTransport(Transport):
             if link is not None:
                 with suppress(Exception):
                     link.close()
+            if isinstance(error, TakenOverError):
+                raise
             self.fault = str(error)
             self._pause_s = _longer(self._pause_s)
             self._next_try_s = self._clock.now() + self._pause_s

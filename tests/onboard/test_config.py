@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_onboard.config import JournalSettings, Robot, SourceSettings, config_from_table, load_config
+from mtm_onboard.config import JournalSettings, LinkSettings, Robot, SourceSettings, config_from_table, load_config
 from mtm_onboard.guard import Limits, Staleness
 from mtm_onboard.motion import STOP
 from mtm_onboard.protocol import MtmError
@@ -34,13 +34,15 @@ def test_the_documented_example_says_what_it_says():
     assert config.limits == Limits(1.0, 2.0, noise_sigmas=4.0)
     assert config.staleness == Staleness(0.1, 0.25)
     assert config.source == SourceSettings("udp", 5005)
-    assert config.journal == JournalSettings("robot0.csv")
+    assert config.journal == JournalSettings("robot0.csv", max_mb=200)
+    assert config.link == LinkSettings(reconnect=True, give_up_s=60)
 
 
 def test_the_defaults_are_those_that_the_example_documents():
     config = config_from_table(table())
     assert config.staleness == load_config(EXAMPLE).staleness
     assert config.limits.noise_sigmas == load_config(EXAMPLE).limits.noise_sigmas
+    assert config.link == load_config(EXAMPLE).link
     assert config.journal is None
 
 
@@ -66,6 +68,9 @@ def test_the_defaults_are_those_that_the_example_documents():
         ({"source": {"kind": "udp", "port": 70_000}}, "choose 1 to 65535"),
         ({"source": {"kind": "udp", "port": 5005.0}}, "give a whole number"),
         ({"journal": {}}, "lacks path"),
+        ({"journal": {"path": "a.csv", "max_mb": 0.5}}, "give a number from 1 on"),
+        ({"link": {"reconnect": "yes"}}, "reconnect is 'yes'; give true or false"),
+        ({"link": {"give_up_s": 0}}, "give seconds above zero"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_with_what_to_change(sections, sentence):
@@ -78,7 +83,7 @@ values = st.recursive(
     lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
     max_leaves=4,
 )
-names = st.sampled_from(["robot", "transport", "limits", "stale", "source", "journal", "kind", "port", "x"])
+names = st.sampled_from(["robot", "transport", "link", "limits", "stale", "source", "journal", "kind", "port", "x"])
 
 
 @given(names, names, values)

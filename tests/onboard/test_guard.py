@@ -4,9 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_onboard.guard import CLAMPED, NOISE, REFUSED, STALE, STOPPED, Guard, Limits, Staleness
+from mtm_onboard.guard import Guard, Limits, Staleness
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.journal_file import CLAMPED, HELD, NOISE, REFUSED, STALE, STOPPED, UNSENT
 
 BASE = BodyVelocity(0.3, -0.1, 0.5)
 NOISY = BodyVelocity(0.35, -0.2, 0.5)
@@ -68,6 +69,29 @@ def test_a_command_that_is_not_finite_is_refused_and_the_last_good_one_ages(bad)
     assert tick(guard, BodyVelocity(0.1, bad, 0.0), NOISY, 0.05, 0.05) == (BASE, BASE)
     assert (guard.flags, guard.refused) == (REFUSED, 1)
     assert guard.admit(BodyVelocity(bad, 0.1, 0.0), 0.3, 0.3) == STOP
+
+
+def test_a_command_from_before_the_link_came_back_holds_the_robot_still():
+    guard = plain_guard(acceleration_mps2=0.1)
+    guard.admit(BASE, 0.0, 0.0)
+    for arrived_s, after_s in ((0.0, 0.01), (0.01, 0.01), (0.02, math.inf)):
+        assert guard.limit(guard.admit(BASE, arrived_s, 0.02, after_s=after_s), NOISY) == STOP
+        assert guard.flags == HELD
+        assert not guard.noise_allowed
+    assert guard.held == 3
+    assert guard.admit(BASE, 0.02, 0.02, after_s=0.01) == BASE
+    # What is refused does not make the old command new.
+    assert guard.admit(BodyVelocity(math.nan, 0.0, 0.0), 0.05, 0.06, after_s=0.05) == STOP
+
+
+def test_a_command_that_never_left_is_not_what_the_next_one_accelerates_from():
+    guard = plain_guard(acceleration_mps2=5.0)
+    first = guard.limit(guard.admit(BASE, 0.0, 0.0), BASE)
+    guard.limit(guard.admit(BASE, 0.02, 0.02), BASE)
+    guard.not_sent()
+    assert (guard.unsent, guard.flags & UNSENT) == (1, UNSENT)
+    third = guard.limit(guard.admit(BASE, 0.04, 0.04), BASE)
+    assert math.dist(first[:2], third[:2]) <= 0.1 + HAIR
 
 
 def test_noise_that_is_not_finite_is_left_out():

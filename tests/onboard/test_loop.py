@@ -80,6 +80,16 @@ def test_however_late_the_wake_ups_no_tick_comes_twice_or_early(delays_s, rate_h
     assert stats.sent + stats.missed == ticks[-1] + 1
 
 
+def test_steps_that_take_longer_than_a_period_are_counted():
+    clock = SimulatedClock()
+
+    def step(tick: int, now_s: float) -> None:
+        clock.sleep_until(now_s + (0.05 if tick % 10 == 4 else 0.01))
+
+    stats = run_loop(clock, 50.0, step, start_s=0.0, stop=lambda: clock.now() >= 1.99)
+    assert (stats.overruns, stats.missed) == (10, 10)
+
+
 def test_stop_is_asked_before_each_tick_and_statistics_outlive_an_exception():
     stats = LoopStats()
 

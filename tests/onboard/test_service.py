@@ -39,3 +39,31 @@ def test_a_failure_ends_the_service_and_is_kept():
         assert link.enough.wait(10.0)
     assert str(service.error) == "cable pulled"
     assert len(link.times_s) == 3
+
+
+def test_whatever_ends_the_thread_is_an_error():
+    class Ending(NullTransport):
+        def service(self, now_s: float) -> None:
+            raise SystemExit
+
+    with ServiceThread(Ending(), SystemClock()) as service:
+        vars(service)["_thread"].join(10.0)
+        assert isinstance(service.error, SystemExit)
+
+
+def test_a_call_that_never_returns_does_not_hold_up_the_end(monkeypatch):
+    monkeypatch.setattr("mtm_onboard.service._LONGEST_FAREWELL_S", 0.05)
+    begun, released = threading.Event(), threading.Event()
+
+    class Wedged(NullTransport):
+        def service(self, now_s: float) -> None:
+            begun.set()
+            released.wait(20.0)
+
+    with ServiceThread(Wedged(), SystemClock()) as service:
+        assert begun.wait(10.0)
+    thread = vars(service)["_thread"]
+    assert thread.is_alive()
+    released.set()
+    thread.join(10.0)
+    assert not thread.is_alive()

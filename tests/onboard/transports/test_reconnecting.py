@@ -13,7 +13,7 @@ from mtm_onboard.modulator import Modulator
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.journal_file import HELD, NOISE, UNSENT, JournalHeader, read_journal
-from mtm_onboard.transports.base import LinkBusyError
+from mtm_onboard.transports.base import LinkBusyError, TakenOverError
 from mtm_onboard.transports.none import NullTransport
 from mtm_onboard.transports.reconnecting import ReconnectingTransport
 from mtm_onboard.transports.robomaster_can import RoboMasterCan
@@ -46,6 +46,7 @@ class Bench:
         self.error: Exception | None = None
         self.service_error: Exception | None = None
         self.is_absent = False
+        self.is_taken_over = False
         self.events: list[tuple[float, str]] = []
         self.commands: list[BodyVelocity] = []
 
@@ -73,6 +74,11 @@ class BenchLink(NullTransport):
         self._happens("open")
         if self.bench.is_absent:
             raise MtmError("no such port")
+
+    def resume(self) -> None:
+        if self.bench.is_taken_over:
+            raise TakenOverError("a pilot flies it")
+        self.open()
 
     def send(self, velocity: BodyVelocity) -> None:
         if self.bench.error is not None:
@@ -251,6 +257,27 @@ def test_an_impossible_command_is_the_caller_s_fault_and_not_the_link_s(bench):
             link.send(BASE)
         bench.error = None
         assert link.losses == 0
+
+
+def test_a_robot_that_somebody_takes_over_while_it_is_driven_is_not_opened_anew(bench):
+    link = bench.reconnecting()
+    link.open()
+    bench.error = TakenOverError("a pilot flies it")
+    with pytest.raises(TakenOverError):
+        link.send(BASE)
+    bench.error, bench.service_error = None, bench.error
+    with pytest.raises(TakenOverError):
+        bench.clock.sleep_until(0.1)
+    assert (link.losses, len(bench.times_s("open"))) == (0, 1)
+
+
+def test_a_robot_that_somebody_takes_over_during_an_outage_is_not_opened_anew(bench):
+    link = bench.reconnecting()
+    link.open()
+    bench.service_error, bench.is_taken_over = OSError("radio silence"), True
+    with pytest.raises(TakenOverError):
+        bench.clock.sleep_until(0.5)
+    assert (link.losses, len(bench.times_s("open"))) == (1, 1)
 
 
 def test_the_journal_tells_of_the_outage_and_holds_nothing_that_was_not_sent(bench, tmp_path):
