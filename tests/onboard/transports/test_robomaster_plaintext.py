@@ -1,7 +1,11 @@
+import itertools
 import math
+import re
 import socket
 import threading
 import time
+import tomllib
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -13,6 +17,8 @@ from mtm_onboard.protocol import MtmError
 from mtm_onboard.transports.base import LinkBusyError
 from mtm_onboard.transports.factory import make_transport
 from mtm_onboard.transports.robomaster_plaintext import MOST_UNANSWERED
+from mtm_onboard.transports.robomaster_tcp import RoboMasterTcp
+from mtm_onboard.transports.robomaster_uart import RoboMasterUart
 from tests.onboard.transports.conformance import Rig, TransportConformance
 from tests.onboard.transports.plaintext_rig import OverSocket, free_udp_port, plaintext_rig
 
@@ -372,6 +378,16 @@ def test_a_robot_that_is_not_there_is_one_sentence():
         make_transport("robomaster-tcp", {"host": "127.0.0.1", "port": 1, "push_port": free_udp_port()}).open()
     with pytest.raises(MtmError, match="/dev/there-is-none cannot be opened"):
         make_transport("robomaster-uart", {"port": "/dev/there-is-none"}).open()
+
+
+@pytest.mark.parametrize(("kind", "kept"), [("robomaster-uart", RoboMasterUart), ("robomaster-tcp", RoboMasterTcp)])
+def test_the_example_configuration_s_alternatives_make_a_link(kind, kept):
+    text = (Path(__file__).parents[3] / "docs" / "robot.example.toml").read_text()
+    section = text.split("[transport]")[1].split("\n[")[0]
+    lines = [line.removeprefix("# ") for line in section.splitlines() if re.match(r"# \w+ = ", line)]
+    start = next(number for number, line in enumerate(lines) if kind in line)
+    table = tomllib.loads("\n".join(itertools.takewhile(lambda line: "kind" not in line, lines[start + 1 :])))
+    assert isinstance(make_transport(kind, table), kept)
 
 
 @pytest.mark.parametrize(("kind", "options"), [("robomaster-uart", {}), ("robomaster-tcp", {"hots": "x"})])
