@@ -9,9 +9,12 @@ import numpy as np
 
 from hil.clock import SimulatedClock
 from hil.rig import LIMITS, SAMPLE_PERIOD_S, RobotReport, RunResult, RunSettings, Wire, seeds_of
+from hil.robots.byte_pipe import PipeEnd, byte_pipe
 from hil.robots.can_line import can_line
 from hil.robots.can_node import CanMotionController
 from hil.robots.direct import DirectTransport
+from hil.robots.mavlink_firmware import COPTER
+from hil.robots.mavlink_vehicle import MavlinkVehicle
 from hil.robots.mecanum import MecanumPlant
 from hil.robots.motion_controller import MotionController
 from hil.robots.plaintext_line import plaintext_line
@@ -27,6 +30,7 @@ from mtm_onboard.protocol.framing import channel_symbols
 from mtm_onboard.runtime import NoiseAdder, Runtime
 from mtm_onboard.source import HeldSource
 from mtm_onboard.transports.base import Transport
+from mtm_onboard.transports.mavlink import MavlinkTransport
 from mtm_onboard.transports.robomaster_can import RoboMasterCan
 
 # After the last stop, so that it has crossed the wire.
@@ -35,12 +39,16 @@ _SETTLING_S = 0.05
 
 @dataclass(frozen=True)
 class _Link:
-    """The wire to one robot: its transport, what its far end does each period, what it found wrong, and its end."""
+    """The wire to one robot: its transport, what its far end does each period, what it found wrong, and its end.
+
+    `lets_go` says whether a stop over this wire switches the motors off as well.
+    """
 
     transport: Transport
     poll: Callable[[float], None]
     faults: Callable[[], int]
     shutdown: Callable[[], None]
+    lets_go: bool = True
 
 
 @dataclass(frozen=True)
@@ -61,7 +69,7 @@ class _Robot:
 
     def report(self, stats: LoopStats) -> RobotReport:
         guard, controller = self.guard, self.controller
-        is_stopped = not controller.work_mode and controller.demand == STOP
+        is_stopped = controller.demand == STOP and not (self.link.lets_go and controller.work_mode)
         return RobotReport(
             self.name, stats.sent, stats.missed, guard.clamped, guard.stale, guard.refused, self.link.faults(),
             controller.deadman_stops, is_stopped,
@@ -71,8 +79,9 @@ class _Robot:
 def run_lockstep(settings: RunSettings) -> RunResult:
     """Run the world and return its motion.
 
-    The same settings give the same result, bit for bit, over CAN and without a wire; in plaintext commands are rounded
-    to 0.1 mm/s and 0.001 deg/s. Raises MtmError when a robot's link fails.
+    The same settings give the same result, bit for bit, over CAN and without a wire. In plaintext commands are rounded
+    to 0.1 mm/s and 0.001 deg/s; over MAVLink the first one waits until the vehicle was heard. Raises MtmError when a
+    robot's link fails.
     """
     clock = SimulatedClock()
     with ExitStack() as wires:
@@ -161,6 +170,10 @@ def _wired(wire: Wire, plant: MecanumPlant, clock: SimulatedClock) -> tuple[Moti
     if wire == "plaintext":
         controller = MotionController(plant, deadman_s=None)  # as the robot has none on this wire
         return controller, _plaintext_link(controller)
+    if wire == "mavlink":
+        ours, theirs = byte_pipe()
+        vehicle = MavlinkVehicle(COPTER, plant, theirs, is_guided=True, is_armed=True)
+        return vehicle.controller, _mavlink_link(vehicle, ours, clock)
     controller = MotionController(plant)
     return controller, _can_link(controller) if wire == "can" else _direct_link(controller, clock)
 
@@ -186,6 +199,17 @@ def _plaintext_link(controller: MotionController) -> _Link:
         return node.faults + controller.faults + transport.refusals + transport.malformed + transport.link_errors
 
     return _Link(transport, node.poll, faults, node.shutdown)
+
+
+def _mavlink_link(vehicle: MavlinkVehicle, ours: PipeEnd, clock: SimulatedClock) -> _Link:
+    transport = MavlinkTransport(profile="copter", clock=clock, open_port=lambda: ours)
+
+    def faults() -> int:
+        health = transport.health()
+        wrong = sum(int(health[name]) for name in ("refusals", "alarms", "link_errors", "bad_frames", "malformed"))
+        return wrong + vehicle.refused_frames + vehicle.ignored_setpoints + vehicle.controller.faults
+
+    return _Link(transport, vehicle.poll, faults, lambda: None, lets_go=False)
 
 
 def _direct_link(controller: MotionController, clock: SimulatedClock) -> _Link:

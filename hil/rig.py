@@ -20,7 +20,7 @@ from mtm_onboard.protocol.framing import Payload
 from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.runtime import NoiseAdder
 
-Wire = Literal["can", "plaintext", "direct"]
+Wire = Literal["can", "plaintext", "mavlink", "direct"]
 # Codebook, channel name and, as `Modulator` takes them, the channel's own symbols or a message that changes them.
 ModulatorFactory = Callable[[Codebook, str, Any], NoiseAdder]
 

@@ -26,6 +26,14 @@ def test_in_plaintext_the_motion_is_the_same_up_to_the_rounding_of_commands():
     assert difference[:, :, 2].max() < 1e-3
 
 
+def test_over_mavlink_the_motion_is_the_same_but_for_the_tick_in_which_the_vehicle_was_awaited():
+    direct, vehicle = (run_lockstep(short_run(wire=wire)) for wire in ("direct", "mavlink"))
+    assert all(robot.is_clean for robot in vehicle.robots), vehicle.robots
+    assert {(robot.sent, robot.missed) for robot in vehicle.robots} == {(149, 0)}
+    # A tick at 0.5 m/s is a centimetre.
+    assert 0.0 < np.abs(motion(vehicle) - motion(direct))[:, :, :2].max() < 0.011
+
+
 @pytest.mark.parametrize("wire", ["can", "plaintext", "direct"])
 def test_a_run_ends_with_every_robot_stopped_and_nothing_wrong(wire):
     result = run_lockstep(short_run(wire=wire))
