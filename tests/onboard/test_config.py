@@ -5,7 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_onboard.config import JournalSettings, LinkSettings, Robot, SourceSettings, config_from_table, load_config
+from mtm_onboard.config import (
+    ControlSettings,
+    JournalSettings,
+    LinkSettings,
+    Robot,
+    SourceSettings,
+    config_from_table,
+    load_config,
+)
 from mtm_onboard.guard import Limits, Staleness
 from mtm_onboard.motion import STOP
 from mtm_onboard.protocol import MtmError
@@ -97,6 +105,14 @@ def test_any_change_gives_a_configuration_or_a_sentence(section, field, value):
     assert config.limits.speed_mps > 0
     assert config.staleness.noise_off_s < config.staleness.stopped_s
     assert config.source.port is None or 1 <= config.source.port <= 65_535
+
+
+def test_a_control_socket_is_optional_and_has_a_path():
+    assert config_from_table(table()).control is None
+    assert config_from_table(table(control={"socket": "a.sock"})).control == ControlSettings("a.sock")
+    for section, sentence in (({}, "lacks socket"), ({"socket": 7}, "give text in quotes"), ({"port": 1}, "unknown")):
+        with pytest.raises(MtmError, match=sentence):
+            config_from_table(table(control=section))
 
 
 def test_files_that_hold_no_configuration_are_refused(tmp_path):
