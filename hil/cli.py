@@ -157,14 +157,13 @@ def sweep(
     world: Annotated[str, typer.Argument(metavar="WORLD", help="The world to measure: robomaster.")],
     out: Annotated[Path, typer.Option(help="The accuracy table to write, for mtm-audit plan.")],
     rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each M and window.")] = 40,
-    alphabet: Annotated[list[int], typer.Option(metavar="M", help="Alphabet size; may be repeated.")] = [4, 16, 64],  # noqa: B006
-    window: Annotated[list[int], typer.Option(metavar="TICKS", min=1, help="Window length; may be repeated.")] = [
-        25,
-        50,
-        75,
-        100,
-        150,
-    ],  # noqa: B006
+    alphabet: Annotated[
+        list[int] | None, typer.Option(metavar="M", help="Alphabet size; may be repeated (default: 4, 16, 64).")
+    ] = None,
+    window: Annotated[
+        list[int] | None,
+        typer.Option(metavar="TICKS", min=1, help="Window; may be repeated (default: 25, 50, 75, 100, 150)."),
+    ] = None,
     scheme: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Measure this scheme's own windows, and whole messages.")
     ] = None,
@@ -179,7 +178,16 @@ def sweep(
         from hil.commands.sweep import sweep as run
 
         options = SweepOptions(
-            world, rollouts, tuple(alphabet), tuple(window), scheme, detector, first_seed, workers, out, cells
+            world,
+            rollouts,
+            tuple(alphabet or ()),
+            tuple(window or ()),
+            scheme,
+            detector,
+            first_seed,
+            workers,
+            out,
+            cells,
         )
         run(options, console)
 

@@ -67,16 +67,16 @@ def record(job: Job, plant: MecanumParameters, seed: int, modulator: ModulatorFa
     key = Key("bench", np.random.default_rng([_KEYS_STREAM, seed]).bytes(32), job.scheme)
     symbols = seeds_of(seed).permutation() if job.windows == 1 else _random_symbols(job, seed)
     seconds = ONSET_S + _LONGEST_MESSAGE * (job.end_s - ONSET_S) + 0.1
-    longer = _glimpses(RunSettings(key, symbols, seconds, seed, "direct", ONSET_S, modulator, plant))
+    longer = glimpses_of(RunSettings(key, symbols, seconds, seed, "direct", ONSET_S, modulator, plant))
     parts = channel_symbols(symbols, job.scheme)
     sent = np.array([parts[channel.name] for channel in job.scheme.channels])
-    return Recording(key.codebook(), sent, tuple(_until(job.end_s, glimpse) for glimpse in longer), longer)
+    return Recording(key.codebook(), sent, tuple(until(job.end_s, glimpse) for glimpse in longer), longer)
 
 
 def record_silence(seconds: float, plant: MecanumParameters, seed: int) -> tuple[Glimpse, ...]:
     """Each robot's motion in the same task without a message."""
     key = Key("bench", bytes(32), fleet_scheme())
-    return _glimpses(RunSettings(key, None, seconds, seed, "direct", 0.0, plant=plant))
+    return glimpses_of(RunSettings(key, None, seconds, seed, "direct", 0.0, plant=plant))
 
 
 def _random_symbols(job: Job, seed: int) -> tuple[int, ...]:
@@ -84,12 +84,13 @@ def _random_symbols(job: Job, seed: int) -> tuple[int, ...]:
     return tuple(int(symbol) for symbol in generator.integers(job.alphabet_size, size=ROBOTS * job.windows))
 
 
-def _glimpses(settings: RunSettings) -> tuple[Glimpse, ...]:
+def glimpses_of(settings: RunSettings) -> tuple[Glimpse, ...]:
+    """Each robot's motion as motion capture shows it in that run."""
     tracks = motion_capture_tracks(run_lockstep(settings), settings.seed, MotionCapture())
     return tuple(glimpse_of_track(track) for track in tracks)
 
 
-def _until(end_s: float, glimpse: Glimpse) -> Glimpse:
+def until(end_s: float, glimpse: Glimpse) -> Glimpse:
     """The part of a glimpse up to `end_s`, with a hair of slack for times that are sums of decimal fractions."""
     count = int(np.searchsorted(glimpse.edges_s, end_s + 1e-6)) - 1
     return replace(
