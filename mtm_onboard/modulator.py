@@ -1,6 +1,7 @@
 """The modulator: the noise of one channel's message, looked up by tick number."""
 
 import threading
+import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ from mtm_onboard.protocol.framing import channel_symbols
 Floats = NDArray[np.float64]
 
 _KEPT_WINDOWS = 2
+# Between two windows that another thread computes, so that the loop's never waits longer than one takes.
+_BREATH_S = 0.001
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +111,7 @@ class Modulator:
 
         One that still waits for its boundary is replaced. Raises MtmError as the constructor does.
         """
-        queued = self._queued(message)
+        queued = self._queued(message, _BREATH_S)
         self._queue.append(queued)
         return queued
 
@@ -181,7 +184,7 @@ class Modulator:
         """Number of the message that begins next after `tick`."""
         return max(0, tick // self._message_ticks + 1)
 
-    def _queued(self, message: Message | Sequence[int]) -> Queued:
+    def _queued(self, message: Message | Sequence[int], breath_s: float = 0.0) -> Queued:
         """`message` with its noise, computed here under the fixed schedule; checks it under both."""
         symbols = self._own_symbols(message, self._codebook.first_slot + self._boundary(self._tick))
         if self._rolling:
@@ -189,6 +192,8 @@ class Modulator:
         noise, offsets = self._rows(len(symbols))
         for window, symbol in enumerate(symbols):
             self._fill(noise, offsets, window, window, symbol)
+            if breath_s:
+                time.sleep(breath_s)
         return Queued(message, noise, offsets)
 
     def _own_symbols(self, message: Message | Sequence[int], slot: int) -> Sequence[int]:
