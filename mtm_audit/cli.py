@@ -120,6 +120,21 @@ def learn_profile(
         run_profile(ProfileOptions(tuple(paths), key, out, tracker, settings))
 
 
+@app.command("journal")
+def show_journal(
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="The journal that mtm-onboard run wrote.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw commands and lateness (.png, .pdf, .svg).")
+    ] = None,
+) -> None:
+    """Say what a robot's journal tells: message and start, ticks, lateness, limits, noise and events."""
+    with reported("mtm-audit", "nothing was written"):
+        from mtm_audit.commands.journal import run_journal
+
+        run_journal(path, as_json=as_json, plot=plot)
+
+
 @app.command()
 def plan(
     table: Annotated[

@@ -1,0 +1,76 @@
+"""`mtm-audit journal`: what a robot's journal says about a run."""
+
+import json
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from mtm_audit.journal import AXES, JournalSummary, summary_of
+from mtm_onboard.protocol.journal_file import JournalHeader, read_journal
+
+_PIPE_COLUMNS = 140
+
+
+def run_journal(path: Path, *, as_json: bool, plot: Path | None) -> None:
+    """Read, draw, print. Raises MtmError when there is no journal, no tick in it, or no picture can be written."""
+    if plot is not None:
+        from mtm_audit.plot import check_plot_path
+
+        check_plot_path(plot)
+    record = read_journal(path)
+    summary = summary_of(record)
+    if plot is not None:
+        from mtm_audit.journalplot import draw_journal
+
+        draw_journal(record, plot)
+    if as_json:
+        sys.stdout.write(json.dumps(summary.as_table(), indent=2, allow_nan=False) + "\n")
+    else:
+        console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS)
+        console.print(_table(summary), highlight=False)
+
+
+def _table(summary: JournalSummary) -> Table:
+    header = summary.header
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column(overflow="fold")
+    late_ms = [f"{1e3 * value:.3f}" for value in summary.lateness_s]
+    units = ("m", "m", "rad")
+    rows = {
+        "robot": f"{header.robot}, channel {header.channel}",
+        "key": f"{header.key_id}, scheme {header.fingerprint}",
+        "message": _message(header),
+        "started": _start(header),
+        "ticks": f"{summary.ticks} at {header.rate_hz:g} Hz, from {summary.first_tick} to {summary.last_tick}, "
+        f"{summary.missed} missed",
+        "of them": ", ".join(f"{count} {name}" for name, count in summary.counts.items()),
+        "lateness": f"median {late_ms[0]} ms, p99 {late_ms[1]} ms, greatest {late_ms[2]} ms",
+        "saturation": f"{100.0 * summary.saturation:.2f} % of ticks cut by a limit",
+        "noise": ", ".join(
+            f"{axis} {rms:.4f} {unit}/s rms, energy {energy:.4g} {unit}\u00b2/s"
+            for axis, unit, rms, energy in zip(AXES, units, summary.rms, summary.energy, strict=True)
+        ),
+    }
+    if summary.damaged:
+        rows["damaged"] = f"{summary.damaged} lines that could not be read"
+    for name, text in rows.items():
+        table.add_row(name, text)
+    for event in summary.events:
+        table.add_row(f"tick {event.tick}", event.text)
+    return table
+
+
+def _message(header: JournalHeader) -> str:
+    if header.symbols is None:
+        return "none, base commands alone"
+    return f"symbols {','.join(map(str, header.symbols))}, {'repeated' if header.repeat else 'once'}"
+
+
+def _start(header: JournalHeader) -> str:
+    if header.start_unix_s is None:
+        return "in simulated time"
+    return f"{header.start_unix_s:.6f} s (Unix time), {datetime.fromtimestamp(header.start_unix_s, UTC):%F %T} UTC"
