@@ -65,7 +65,7 @@ class MavlinkTransport(Transport):
         open_port: Callable[[], Port] | None = None,
         timestamp: Callable[[], int] = signing_timestamp,
     ) -> None:
-        _check_options(target_system, set_mode, arm, open_timeout_s)
+        _check_options(endpoint, target_system, set_mode, arm, open_timeout_s)
         self._profile = profile_named(profile)
         # A send may find a heartbeat on its way and then has to wait for both.
         self._open_port = open_port or port_opener(endpoint, baud, self.write_bound_s / 2)
@@ -115,7 +115,10 @@ class MavlinkTransport(Transport):
         self._open(self._set_mode, self._arm)
 
     def resume(self) -> None:
-        """As `open`, but without asking for mode or arming: while the link was lost a pilot may have changed both."""
+        """As `open`, but without asking for mode or arming: while the link was lost a pilot may have changed both.
+
+        A PX4 has then left OFFBOARD by itself, and drives again only when the pilot puts it back.
+        """
         self._open(set_mode=False, arm=False)
 
     def _open(self, set_mode: bool, arm: bool) -> None:
@@ -304,7 +307,11 @@ class MavlinkTransport(Transport):
             self._is_engaged = False
 
 
-def _check_options(target_system: object, set_mode: object, arm: object, open_timeout_s: object) -> None:
+def _check_options(
+    endpoint: object, target_system: object, set_mode: object, arm: object, open_timeout_s: object
+) -> None:
+    if not isinstance(endpoint, str):
+        raise MtmError(f"the MAVLink endpoint is {endpoint!r}; give text in quotes, such as udpin:0.0.0.0:14550")
     for name, value in (("set_mode", set_mode), ("arm", arm)):
         if not isinstance(value, bool):
             raise MtmError(f"{name} is {value!r}; give true or false")

@@ -1,19 +1,29 @@
+import sys
 import threading
+import tomllib
+from pathlib import Path
 
 import pytest
 
+from hil.robots.mavlink_vehicle import MavlinkVehicle
+from mtm_onboard.clock import SystemClock
+from mtm_onboard.loop import run_loop
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.service import ServiceThread
 from mtm_onboard.transports.base import TakenOverError
 from mtm_onboard.transports.factory import make_transport
 from mtm_onboard.transports.mavlink import MavlinkTransport
 from mtm_onboard.transports.mavlink_codec import MavlinkCodec
+from mtm_onboard.transports.mavlink_ports import UdpPort
+from tests.hil.robots.floating_plant import FloatingPlant
 from tests.onboard.transports.conformance import TransportConformance
 from tests.onboard.transports.mavlink_rig import FIRMWARES, line_rig, mavlink_rig
 from tests.onboard.transports.mavlink_spec import read_frames
 
 FORWARD = BodyVelocity(0.5, 0.0, 0.0)
 SET_MODE, ARM = 176, 400
+EXAMPLE = Path(__file__).parents[3] / "docs" / "robot.example.toml"
 
 
 class TestMavlinkCopterConforms(TransportConformance):
@@ -306,6 +316,7 @@ def test_commands_and_heartbeats_from_two_threads_never_share_a_number():
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
+        ({"endpoint": 14550}, "give text in quotes"),
         ({"profile": "boat"}, "choose one of: rover, copter, px4"),
         ({"arm": "no"}, "arm is 'no'; give true or false"),
         ({"set_mode": 1}, "set_mode is 1; give true or false"),
@@ -325,3 +336,60 @@ def test_the_configuration_s_kind_makes_it_and_a_wrong_option_is_one_sentence():
     assert isinstance(transport, MavlinkTransport)
     with pytest.raises(MtmError, match="does not take these options"):
         make_transport("mavlink", {"endpoint": "udpin:127.0.0.1:14550", "profile": "px4", "set_modes": True})
+
+
+def test_the_documented_options_are_those_it_takes_and_their_defaults(tmp_path):
+    text = EXAMPLE.read_text(encoding="utf-8")
+    lines = text[text.index('# kind = "mavlink"') : text.index("[link]")].splitlines()
+    options = tomllib.loads("\n".join(line.removeprefix("# ") for line in lines))
+    key_file = tmp_path / options["signing_key_file"]
+    key_file.touch(0o600)
+    key_file.write_text("00" * 32)
+    transport = make_transport(options.pop("kind"), options | {"signing_key_file": str(key_file)})
+    assert isinstance(transport, MavlinkTransport)
+    assert {"set_mode": False, "arm": False, "target_system": 1, "open_timeout_s": 10.0}.items() <= options.items()
+
+
+def test_a_missing_library_is_one_sentence(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pymavlink.dialects.v20", None)
+    with pytest.raises(MtmError, match=r"install mtm\[mavlink\]"):
+        MavlinkTransport("udpin:127.0.0.1:14550", profile="copter")
+
+
+@pytest.mark.realtime
+def test_a_vehicle_is_driven_over_udp_in_real_time():
+    there, plant = UdpPort(listen=("127.0.0.1", 0)), FloatingPlant()
+    vehicle = MavlinkVehicle(FIRMWARES["px4"], plant, there)
+    clock, ended = SystemClock(), threading.Event()
+    began_s = clock.now()
+
+    def poll(_tick, now_s):
+        vehicle.poll(now_s - began_s)
+
+    far_end = threading.Thread(
+        target=run_loop, args=(clock, 100.0, poll), kwargs=dict(start_s=began_s, stop=ended.is_set)
+    )
+    far_end.start()
+    transport = MavlinkTransport(f"udpout:127.0.0.1:{there.number}", profile="px4", set_mode=True, arm=True)
+    try:
+        with transport, ServiceThread(transport, clock) as service:
+            start_s = clock.now()
+
+            def step(_tick, _now_s):
+                transport.send(BodyVelocity(0.5, 0.25, 0.0))
+
+            run_loop(clock, 50.0, step, start_s=start_s, stop=lambda: clock.now() > start_s + 1.0)
+            assert service.error is None
+            telemetry, health = transport.telemetry, transport.health()
+        assert telemetry.velocity_body_mps == (0.5, 0.25)
+        assert plant.position_xy_m == pytest.approx((0.5, 0.25), abs=0.15)
+        assert health["setpoints"] > 50 + 40
+        assert health["link_errors"] == health["bad_frames"] == health["refusals"] == 0
+        ended.set()
+        far_end.join()
+        vehicle.poll(clock.now() - began_s)
+        assert plant.velocity_body == STOP
+    finally:
+        ended.set()
+        far_end.join()
+        there.close()
