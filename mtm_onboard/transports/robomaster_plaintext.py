@@ -1,6 +1,7 @@
 """The RoboMaster EP through its plaintext SDK, whatever line the text goes over."""
 
 import threading
+import time
 from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Final
@@ -28,7 +29,9 @@ from mtm_onboard.transports.plaintext_messages import (
 # A second's commands at 50 Hz. The robot queues 512 of them, and one that is obeyed late is worse than none.
 MOST_UNANSWERED: Final = 50
 
-_STOP_WITHIN_S = 0.1
+_STOP_TRIES = 5
+_STOP_TRY_WITHIN_S = 0.03
+_STOP_PAUSE_S = 0.005
 
 
 @dataclass(frozen=True)
@@ -141,13 +144,11 @@ class RoboMasterPlaintext(Transport):
             if self._link is None:
                 return
             still = f"{STAND_STILL};".encode("ascii")
-            try:
-                self._link.write(3 * still + 2 * QUIT, _STOP_WITHIN_S)
-            except MtmError as error:
-                self.link_errors += 1
-                raise MtmError(
-                    f"The stop could not be sent ({error}); switch the robot off by hand, then check the link."
-                ) from error
+            fault = self._persist(self._link, 3 * still + 2 * QUIT)
+        if fault is not None:
+            raise MtmError(
+                f"The stop could not be sent in {_STOP_TRIES} tries; switch the robot off by hand, then check the link."
+            ) from fault
 
     def close(self) -> None:
         """Release the line; nothing is sent or read afterwards until `open`."""
@@ -206,6 +207,18 @@ class RoboMasterPlaintext(Transport):
         except MtmError:
             self.link_errors += 1
             raise
+
+    def _persist(self, link: ByteLink, text: bytes) -> MtmError | None:
+        fault = None
+        for _ in range(_STOP_TRIES):
+            try:
+                link.write(text, _STOP_TRY_WITHIN_S)
+                return None
+            except MtmError as error:
+                self.link_errors += 1
+                fault = error
+            time.sleep(_STOP_PAUSE_S)
+        return fault
 
     def _take(self, text: str, now_s: float) -> None:
         try:

@@ -1,5 +1,6 @@
 """The RoboMaster EP's network: commands and answers over TCP, telemetry by UDP."""
 
+import ipaddress
 import socket
 
 from mtm_onboard.protocol.errors import MtmError
@@ -15,12 +16,16 @@ class RoboMasterTcp(RoboMasterPlaintext):
     """The robot at IP address `host`: 192.168.2.1 in its own Wi-Fi, 192.168.42.2 over USB.
 
     Telemetry comes to UDP port `push_port` of this host, where one program can listen at a time; datagrams of other
-    hosts are not looked at.
+    hosts are not looked at. Raises MtmError when `host` is no such address.
     """
 
     def __init__(self, host: str, port: int = CONTROL_PORT, push_port: int = PUSH_PORT) -> None:
         super().__init__()
-        self._host = host
+        try:
+            # Datagrams are told from a stranger's by it, so a name would not do.
+            self._host = str(ipaddress.IPv4Address(host))
+        except ValueError:
+            raise MtmError(f"the robot's host is {host!r}; give its IP address, such as 192.168.2.1") from None
         self._port = port
         self._push_port = push_port
         self._pushes: socket.socket | None = None

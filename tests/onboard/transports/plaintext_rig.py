@@ -1,15 +1,18 @@
 """A RoboMaster EP's plaintext link with the simulated robot at its far end: in memory, on a pty, or over TCP."""
 
+import os
+import select
 import socket
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 
 from hil.clock import SimulatedClock
 from hil.robots.motion_controller import MotionController
 from hil.robots.plaintext_node import PlaintextMotionController
 from hil.robots.plaintext_ports import LinePort, Port, PtyPort, TcpPort
 from mtm_onboard.motion import BodyVelocity
+from mtm_onboard.protocol import MtmError
 from mtm_onboard.transports.byte_link import ByteLink
 from mtm_onboard.transports.robomaster_plaintext import RoboMasterPlaintext
 from mtm_onboard.transports.robomaster_tcp import RoboMasterTcp
@@ -70,13 +73,24 @@ class PlaintextRig:
         self.controller = MotionController(self.plant, deadman_s=None)
         self.links: list[ByteLink] = []
         self.ends: list[socket.socket] = []
-        self.transport, port = self._line(kind)
+        self.is_cut = False
+        self._refusals = 0
+        self._made: list[RoboMasterPlaintext] = []
+        self._make, port = self._line(kind)
         self.port = CountingPort(port, self)
         self.node = PlaintextMotionController(self.controller, [*others, self.port])
-        self._connect = self.transport._connect
-        self.transport._connect = self._counted_link
+        self.transport = self.remake()
         self.clock.every(0.010, self.node.poll)
-        self.clock.every(self.transport.service_period_s, self._service)
+        self.clock.every(self.transport.service_period_s, self.transport.service)
+
+    def remake(self) -> RoboMasterPlaintext:
+        """Another transport to the same robot."""
+        transport = self._make()
+        connect, serve = transport._connect, transport.service
+        transport._connect = lambda: self._counted_link(connect)
+        transport.service = lambda now_s: self._served(transport, serve, now_s)
+        self._made.append(transport)
+        return transport
 
     def sent_bytes(self) -> int:
         return sum(link.sent_bytes for link in self.links)
@@ -89,35 +103,64 @@ class PlaintextRig:
             self.transport.send(velocity)
             self.run(0.02)
 
+    def refuse(self, writes: int) -> None:
+        self._refusals = writes
+
+    def clog(self) -> None:
+        """Leave no room in the line, from which nobody reads until the clock goes on."""
+        descriptor = self.links[-1]._descriptor
+        while select.select([], [descriptor], [], 0.05)[1]:
+            with suppress(BlockingIOError):
+                os.write(descriptor, b" " * 4096)
+
+    def cut(self) -> None:
+        self.is_cut = True
+
+    def mend(self) -> None:
+        self.is_cut = False
+
     def shutdown(self) -> None:
-        self.transport.close()
+        for transport in self._made:
+            transport.close()
         self.node.shutdown()
         for end in self.ends:
             end.close()
 
-    def _line(self, kind: str) -> tuple[RoboMasterPlaintext, Port]:
+    def _line(self, kind: str) -> tuple[Callable[[], RoboMasterPlaintext], Port]:
         if kind == "pty":
             port = PtyPort()
-            return RoboMasterUart(port.path), port
+            return lambda: RoboMasterUart(port.path), port
         if kind == "tcp":
             push_port = free_udp_port()
             tcp_port = TcpPort(push_port=push_port)
-            return RoboMasterTcp("127.0.0.1", tcp_port.port, push_port), tcp_port
+            return lambda: RoboMasterTcp("127.0.0.1", tcp_port.port, push_port), tcp_port
         ours, theirs = socket.socketpair()
         self.ends = [ours, theirs]
-        return OverSocket(ours), LinePort(theirs.fileno(), lambda: None)
+        return lambda: OverSocket(ours), LinePort(theirs.fileno(), lambda: None)
 
-    def _counted_link(self) -> ByteLink:
-        self.links.append(self._connect())
+    def _counted_link(self, connect: Callable[[], ByteLink]) -> ByteLink:
+        self._check_wire()
+        link = connect()
+        write, read = link.write, link.read
+        link.write = lambda message, within_s: self._check_wire() or write(message, within_s)
+        link.read = lambda: b"" if self.is_cut else read()
+        self.links.append(link)
         # What was answered before is lost or read in addition.
         self._answered = self.port.answered
-        return self.links[-1]
+        return link
 
-    def _service(self, now_s: float) -> None:
+    def _check_wire(self) -> None:
+        if self.is_cut or self._refusals:
+            self._refusals = max(0, self._refusals - 1)
+            raise MtmError("The wire is broken, for a test; mend it.")
+
+    def _served(self, transport: RoboMasterPlaintext, serve: Callable[[float], None], now_s: float) -> None:
         deadline_s = time.monotonic() + PATIENCE_S
         while True:
-            self.transport.service(now_s)
-            if self.transport._link is None or self.links[-1].received_bytes >= self.port.answered - self._answered:
+            serve(now_s)
+            if transport._link is None or self.is_cut:
+                return
+            if transport._link.received_bytes >= self.port.answered - self._answered:
                 return
             assert time.monotonic() < deadline_s
 

@@ -36,7 +36,10 @@ class TestRoboMasterPlaintextConforms(TransportConformance):
     @pytest.fixture(params=["memory", "pty", "tcp"])
     def rig(self, request):
         with plaintext_rig(request.param) as rig:
-            yield Rig(rig.transport, rig.controller, rig.plant, rig.clock, rig.sent_bytes)
+            yield Rig(
+                rig.transport, rig.controller, rig.plant, rig.clock, rig.sent_bytes,
+                refuse=rig.refuse, clog=rig.clog, cut=rig.cut, mend=rig.mend, remake=rig.remake,
+            )  # fmt: skip
 
 
 @pytest.fixture
@@ -378,6 +381,12 @@ def test_a_robot_that_is_not_there_is_one_sentence():
         make_transport("robomaster-tcp", {"host": "127.0.0.1", "port": 1, "push_port": free_udp_port()}).open()
     with pytest.raises(MtmError, match="/dev/there-is-none cannot be opened"):
         make_transport("robomaster-uart", {"port": "/dev/there-is-none"}).open()
+
+
+@pytest.mark.parametrize("host", ["robot.local", "192.168.2", "", "::1"])
+def test_a_host_that_is_no_ip_address_is_one_sentence(host):
+    with pytest.raises(MtmError, match="give its IP address"):
+        RoboMasterTcp(host)
 
 
 @pytest.mark.parametrize(("kind", "kept"), [("robomaster-uart", RoboMasterUart), ("robomaster-tcp", RoboMasterTcp)])
