@@ -37,11 +37,12 @@ def draw_journal(record: JournalRecord, path: Path) -> None:
             axes.axvline(event.tick / record.header.rate_hz, color="#b54708", linewidth=1.0, linestyle=":")
     thinned = "" if every == 1 else f" (every {every}th tick)"
     commands[-1].set_xlabel(f"seconds since the message's start{thinned}; dotted: events")
-    commands[0].legend(loc="upper right", ncols=2, frameon=False, fontsize=9)
+    commands[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=9)
     late_ms = np.maximum(1e3 * record.lateness_s, 1e-3)
     bins = np.geomspace(late_ms.min() * 0.99, max(late_ms.max(), 1e-2) * 1.01, 60)
     lateness.hist(late_ms, bins=bins.tolist(), color="#a9b4c2", edgecolor="#8593a6", linewidth=0.6)
     lateness.set(xscale="log", yscale="log", xlabel="lateness of a tick [ms]", ylabel="ticks")
+    lateness.set_ylim(bottom=0.5)
     lateness.spines[["top", "right"]].set_visible(False)
     with replacing(path) as temporary:
         figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))

@@ -13,6 +13,7 @@ import pytest
 
 from mtm_onboard.cli import main
 from mtm_onboard.client import BaseCommandClient
+from mtm_onboard.clock import SystemClock
 from mtm_onboard.guard import NOISE
 from mtm_onboard.journal import read_journal
 from mtm_onboard.modulator import Modulator
@@ -226,6 +227,31 @@ def test_an_interrupt_ends_a_run_on_a_controller_s_commands_with_nothing_wrong(t
     assert (process.returncode, error) == (0, b"")
     assert b"ticks sent" in out
     assert not np.any(read_journal(journal).flags & NOISE)
+
+
+@pytest.mark.realtime
+def test_a_run_outlives_its_key_file_and_its_journal_outlives_the_run(tmp_path, key):
+    configure(tmp_path)
+    process = start(tmp_path, "--symbols", "3,1,0,2", "--stdin")
+    assert process.stdin is not None
+    wanted = 10
+    while process.poll() is None and noisy_ticks(tmp_path) < wanted:
+        if noisy_ticks(tmp_path) and key.exists():
+            key.unlink()
+            (tmp_path / "robot.toml").unlink()
+            wanted = noisy_ticks(tmp_path) + 20
+        process.stdin.write(b"v 0.2 0 0.1\n")
+        process.stdin.flush()
+        select.select([], [], [], 0.02)
+    assert not key.exists()
+    process.kill()
+    killed_s = SystemClock().now()
+    process.communicate(timeout=20)
+    assert process.returncode == -signal.SIGKILL
+    record = read_journal(tmp_path / "journal.csv")
+    assert np.count_nonzero(record.flags == NOISE) >= wanted
+    # Written ten times a second; the rest is what a busy host may add.
+    assert killed_s - record.times_s[-1] < 1.0
 
 
 def test_a_journal_that_cannot_be_written_is_an_error(tmp_path, key, capsys):

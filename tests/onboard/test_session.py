@@ -5,7 +5,7 @@ from itertools import count
 
 import pytest
 
-from mtm_onboard.config import RobotConfig, config_from_table
+from mtm_onboard.config import LinkSettings, RobotConfig, config_from_table
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol import Channel, Key, MtmError
 from mtm_onboard.session import Plan, run_session
@@ -127,3 +127,45 @@ def test_what_does_not_fit_the_key_is_refused_before_the_link_is_opened(config, 
     with pytest.raises(MtmError, match="no channel 'z'"):
         run_session(replace(config, robot=replace(config.robot, channel="z")), KEY, Plan(None), never)
     assert link.events == []
+
+
+def test_a_link_that_may_come_back_is_opened_anew_and_its_losses_are_told(config, use):
+    link = use(Link("send"))
+    config = replace(config, link=LinkSettings())
+    outcome = run_session(config, KEY, Plan((0, 1, 2, 3), duration_s=0.3), never)
+    assert outcome.link_losses >= 1
+    assert "link losses" in outcome.summary()
+    assert link.events[:3] == ["open", "stop", "close"]
+    assert link.events.count("open") >= 2
+    assert link.events[-1] == "close"
+
+
+def test_steps_of_the_system_s_time_do_not_touch_a_run(config, use, monkeypatch):
+    use(Link())
+    hours = count()
+    # Set right, an hour back, two hours back ...
+    monkeypatch.setattr("mtm_onboard.session.time.time", lambda: 1.7e9 - 3600.0 * next(hours))
+    stats = run_session(config, KEY, Plan((0, 1, 2, 3), duration_s=0.2), never).stats
+    assert 1 <= stats.sent <= 16
+    assert stats.missed <= 16
+
+
+def test_the_robot_is_told_to_stop_before_a_wedged_thread_is_waited_for(config, use, monkeypatch):
+    monkeypatch.setattr("mtm_onboard.service._LONGEST_FAREWELL_S", 20.0)
+
+    class Wedged(Link):
+        def __init__(self) -> None:
+            super().__init__()
+            self.told = threading.Event()
+
+        def service(self, now_s: float) -> None:
+            if not self.told.wait(20.0):
+                self.events.append("waited in vain")
+
+        def stop(self) -> None:
+            super().stop()
+            self.told.set()
+
+    link = use(Wedged())
+    run_session(config, KEY, Plan(None, duration_s=0.0), never)
+    assert link.events == ["open", "stop", "stop", "close"]
