@@ -125,6 +125,21 @@ def false_alarms(
 
 
 @app.command()
+def frames(
+    count: Annotated[int, typer.Option("-n", min=200, help="Frames for each check and for each attack.")] = 10_000,
+    seed: Annotated[int, typer.Option(min=0, help="The first cell's seed.")] = 0,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
+    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
+    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/frames.jsonl"),
+) -> None:
+    """Decode noisy and attacked frames: how often a wrong payload passes the check, and which decoder reads most."""
+    with _reported() as console:
+        from hil.commands.frames import frames as run
+
+        run(count, seed, workers, out, cells, console)
+
+
+@app.command()
 def shim(
     rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts, each run with Python and with the shim.")] = 100,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
