@@ -69,7 +69,9 @@ def channel_image(
     first_message: int = 0,
     messages: int = 1,
 ) -> Image:
-    """The channel's own `symbols` (l_c of them) as an image, untagged; `limits` in m/s, m/s, rad/s.
+    """The channel's own `symbols` as an image, untagged; `limits` in m/s, m/s, rad/s.
+
+    There are l_c symbols, or l_c for each message where these differ.
 
     Under the fixed schedule the image is one message, again and again when `repeat` is set. Under the rolling
     schedule it is `messages` messages from number `first_message` on, each window with its own waveform, and ends.
@@ -79,7 +81,9 @@ def channel_image(
     channel = scheme.channel(channel_name)
     _check_message(scheme, channel, symbols, first_message, messages)
     windows = range(first_message * channel.symbols, (first_message + messages) * channel.symbols)
-    parts = [codebook.samples(channel, window, [symbols[window % channel.symbols]])[0] for window in windows]
+    parts = [
+        codebook.samples(channel, window, [symbols[place % len(symbols)]])[0] for place, window in enumerate(windows)
+    ]
     noise = channel.sigma * np.concatenate(parts, axis=1)
     # The format has the axes in the order vx, vy, wz, a channel in any.
     order = sorted(range(len(channel.axes)), key=lambda row: AXES.index(channel.axes[row]))
@@ -161,15 +165,15 @@ def _check_message(scheme: Scheme, channel: Channel, symbols: Sequence[int], fir
             f"channel {channel.name!r} has the axis {foreign[0]!r}, but an image plays only {', '.join(AXES)}; "
             "choose a channel with those"
         )
-    if len(symbols) != channel.symbols:
+    if not 1 <= messages <= MAX_MESSAGES:
+        raise MtmError(f"an image holds 1 to {MAX_MESSAGES} messages, not {messages}; export several images")
+    if len(symbols) not in (channel.symbols, messages * channel.symbols):
         raise MtmError(
             f"channel {channel.name!r} sends {channel.symbols} symbols a message, not {len(symbols)}; "
             "give this channel's own part of the message"
         )
     if scheme.message_ticks > _MAX_MESSAGE_TICKS:
         raise MtmError(f"a message of {scheme.message_ticks} ticks is too long for an image; {_MAX_MESSAGE_TICKS} fit")
-    if not 1 <= messages <= MAX_MESSAGES:
-        raise MtmError(f"an image holds 1 to {MAX_MESSAGES} messages, not {messages}; export several images")
     if first_message < 0:
         raise MtmError(f"the first message is {first_message}; messages are counted from 0")
     if scheme.schedule == "fixed" and (messages, first_message) != (1, 0):

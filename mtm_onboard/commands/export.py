@@ -5,6 +5,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mtm_onboard.commands.contentoptions import add_content, content
+
 if TYPE_CHECKING:
     from mtm_onboard.protocol import Channel, Scheme
 
@@ -18,17 +20,13 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser = subparsers.add_parser("export", help="write a message as an image for firmware_shim")
     parser.add_argument("--key", required=True, type=Path, help="the key file")
     parser.add_argument("--channel", help="the scheme's channel that the robot plays; may be left out if there is one")
-    message = parser.add_mutually_exclusive_group(required=True)
-    message.add_argument("--message", type=int, metavar="N", help="the message as a number")
-    message.add_argument("--symbols", type=_symbols, metavar="S,S,...", help="the whole message as symbols")
+    add_content(parser)
     parser.add_argument("-o", "--out", required=True, type=Path, help="the image to write; it replaces an older one")
     parser.add_argument("--no-repeat", action="store_true", help="fixed schedule: play the message once")
     length = parser.add_mutually_exclusive_group()
     length.add_argument("--messages", type=int, metavar="N", help="rolling schedule: how many messages (1)")
     length.add_argument("--span", type=float, metavar="S", help="rolling schedule: messages for at least this long")
-    parser.add_argument(
-        "--first-message", type=int, metavar="N", default=0, help="rolling schedule: number of the first"
-    )
+    parser.add_argument("--first-message", type=int, metavar="N", default=0, help="rolling schedule: slot of the first")
     parser.add_argument("--limit-mps", type=float, default=_SPEED_MPS, help="largest |vx| and |vy| sent (%(default)s)")
     parser.add_argument("--limit-radps", type=float, default=_TURN_RATE_RADPS, help="largest |wz| sent (%(default)s)")
     parser.set_defaults(handler=run)
@@ -36,23 +34,28 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Write the image with mode 0600: it holds no secret, but whoever has it can play the message."""
-    from mtm_onboard.image import channel_image, image_bytes, tagged
+    from mtm_onboard.image import MAX_MESSAGES, channel_image, image_bytes, tagged
+    from mtm_onboard.message import message_of
     from mtm_onboard.protocol import load_key
     from mtm_onboard.protocol.atomicfile import replacing
-    from mtm_onboard.protocol.framing import channel_symbols, check_symbols, symbols_of_number
+    from mtm_onboard.protocol.framing import channel_symbols
 
     key = load_key(args.key)
     scheme = key.scheme
     channel = _channel(scheme, args.channel)
-    whole = symbols_of_number(args.message, scheme) if args.symbols is None else check_symbols(args.symbols, scheme)
+    message, messages = message_of(content(args), key), _messages(args, scheme)
+    # More messages than an image holds are refused below.
+    last = args.first_message + min(messages, MAX_MESSAGES)
+    slots = range(args.first_message, last) if scheme.schedule == "rolling" else range(1)
+    own = [channel_symbols(message.symbols(slot), scheme)[channel.name] for slot in slots]
     image = channel_image(
         key.codebook(),
         channel.name,
-        channel_symbols(whole, scheme)[channel.name],
+        [symbol for symbols in own for symbol in symbols],
         limits=(args.limit_mps, args.limit_mps, args.limit_radps),
         repeat=not args.no_repeat,
         first_message=args.first_message,
-        messages=_messages(args, scheme),
+        messages=messages,
     )
     data = image_bytes(tagged(image, key.secret))
     with replacing(args.out, mode=0o600) as temporary:
@@ -88,7 +91,3 @@ def _messages(args: argparse.Namespace, scheme: "Scheme") -> int:
     if not math.isfinite(messages):
         raise MtmError(f"the span is {args.span} s; give a shorter one")
     return math.ceil(messages)
-
-
-def _symbols(text: str) -> tuple[int, ...]:
-    return tuple(int(part) for part in text.split(","))

@@ -1,10 +1,14 @@
 """`mtm-onboard export` through the shipped command line."""
 
+import numpy as np
 import pytest
 
 from mtm_onboard.cli import main
 from mtm_onboard.image import parse_image, tag_is_good
+from mtm_onboard.message import message_of
+from mtm_onboard.modulator import Modulator
 from mtm_onboard.protocol import Channel, Key, Scheme, load_key, save_key
+from mtm_onboard.protocol.framing import Framing
 
 SECRET = b"not a real secret, only for test"
 
@@ -39,6 +43,23 @@ def test_the_image_holds_the_channels_part_of_the_message(key_path, capsys):
 def test_one_channel_needs_no_name_and_a_fixed_message_repeats_unless_told_not_to(key_path):
     assert parse_image(export(key_path, "--message", "5")[1].read_bytes()).repeats
     assert not parse_image(export(key_path, "--message", "5", "--no-repeat")[1].read_bytes()).repeats
+
+
+def test_a_framed_message_is_written_as_each_slot_and_day_has_it(tmp_path):
+    framing = Framing("text", 16, check="tag", check_bits=16, interleave=True)
+    channels = (Channel("robot0", "robot0", ("vx", "vy"), 20, 0.1),)
+    key = Key("test", SECRET, Scheme("test", 50.0, (2.0, 20.0), 4, 400, channels, schedule="rolling", framing=framing))
+    save_key(key, tmp_path / "robot.key")
+    # The second of these three slots of 8 s begins at midnight.
+    _, out = export(tmp_path / "robot.key", "--text", "hi", "--first-message", "10799", "--messages", "3")
+    modulator = Modulator(key.codebook(10_799), "robot0", message_of("hi", key))
+    noise = []
+    for tick in range(1200):
+        noise.append(0.1 * modulator.perturbation(tick))
+        modulator.prepare(tick)
+    image = parse_image(out.read_bytes())
+    played = image.samples.T * np.array(image.steps[:2]) / (1 << 36)
+    assert played == pytest.approx(np.array(noise), abs=1e-4)
 
 
 @pytest.mark.parametrize(
