@@ -33,7 +33,11 @@ class CoherencyDetector:
         onset_s: float | None,
         progress: Callable[[float], None] | None = None,
     ) -> list[ChannelReading | MtmError]:
-        """Read the channels one by one; each has its own timing."""
+        """Read the channels one by one; each has its own timing. Raises MtmError without decoys."""
+        if not decoys:
+            raise MtmError(
+                "the coherency detector measures chance scores on decoys and got none; give one decoy at least"
+            )
         results: list[ChannelReading | MtmError] = []
         for number, observation in enumerate(observations):
             if progress is not None:

@@ -9,21 +9,19 @@ from mtm_audit.detectors.base import ChannelReading, Observation, Reading
 from mtm_audit.detectors.matched.correlate import prepare
 from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recording_noise
 from mtm_audit.detectors.matched.evidence import log_sum_exp
+from mtm_audit.detectors.matched.fleet import Member, share_timings
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
-from mtm_audit.detectors.matched.noise import principal_axes
+from mtm_audit.detectors.matched.noise import NoiseModel, principal_axes
 from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_audit.detectors.matched.refine import refined_timing
-from mtm_audit.detectors.matched.search import search_timings
-from mtm_audit.detectors.matched.windows import Window, make_windows
+from mtm_audit.detectors.matched.search import Found, search_timings
+from mtm_audit.detectors.matched.windows import LEAST_PART, Window, make_windows
 from mtm_audit.timing import Timing
 from mtm_audit.tracks import Floats
 from mtm_audit.verdict import Evidence, weigh_log_evidence
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel
-
-# A window counts when at least this part of it is in the recording.
-_LEAST_PART = 0.3
 
 
 class MatchedDetector:
@@ -76,10 +74,7 @@ class MatchedDetector:
         moved = list(motions.values())
         moved = _along_principal_axes(moved)
         noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
-        searched = []
-        for row, (channel, motion) in enumerate(zip(channels, moved, strict=True)):
-            part = None if progress is None else _part_of(progress, row, len(moved))
-            searched.append(search_timings([codebook, *decoys], channel, prepare(motion, noise, row), onset_s, part))
+        searched = _searched([codebook, *decoys], channels, moved, noise, onset_s, progress)
         timings = [found[0].timing for found in searched]
         free = onset_s is None
         windows = _all_windows(codebook, channels, moved, timings, searched=free)
@@ -95,6 +90,30 @@ class MatchedDetector:
             reading = _reading(codebook, channels[row], row, windows, found, timings[row], float(strengths[0]))
             readings[number] = ChannelReading(reading, _posteriors(reading.scores), strengths[1:])
         return readings
+
+
+def _searched(
+    codebooks: Sequence[Codebook],
+    channels: Sequence[Channel],
+    motions: Sequence[Motion],
+    noise: NoiseModel,
+    onset_s: float | None,
+    progress: Callable[[float], None] | None,
+) -> list[list[Found]]:
+    """For each robot, for each codebook the timing; robots whose windows are of one length share what they found."""
+    prepared = [prepare(motion, noise, row) for row, motion in enumerate(motions)]
+    searched = []
+    for row, (channel, robot) in enumerate(zip(channels, prepared, strict=True)):
+        part = None if progress is None else _part_of(progress, row, len(channels))
+        searched.append(search_timings(codebooks, channel, robot, onset_s, part))
+    lengths = [codebooks[0].scheme.window_ticks(channel) for channel in channels]
+    for length in dict.fromkeys(lengths):
+        fleet = [row for row, other in enumerate(lengths) if other == length]
+        if len(fleet) > 1:
+            members = [Member(channels[row], prepared[row], searched[row]) for row in fleet]
+            for row, found in zip(fleet, share_timings(codebooks, members, onset_s), strict=True):
+                searched[row] = found
+    return searched
 
 
 def _along_principal_axes(motions: Sequence[Motion]) -> list[Motion]:
@@ -127,8 +146,8 @@ def _all_windows(
     for number, (channel, motion, timing) in enumerate(zip(channels, motions, timings, strict=True)):
         length_s = codebook.scheme.window_ticks(channel) / timing.rate_hz
         end_s = motion.start_s + len(motion.seen) * motion.step_s
-        first = int(np.ceil((motion.start_s - timing.onset_s) / length_s - (1.0 - _LEAST_PART)))
-        last = int(np.floor((end_s - timing.onset_s) / length_s - _LEAST_PART))
+        first = int(np.ceil((motion.start_s - timing.onset_s) / length_s - (1.0 - LEAST_PART)))
+        last = int(np.floor((end_s - timing.onset_s) / length_s - LEAST_PART))
         if not searched or codebook.scheme.schedule == "rolling":
             first = max(0, first)
         if last < first:

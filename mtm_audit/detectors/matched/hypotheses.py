@@ -67,8 +67,13 @@ def make_grid(
     numbers = np.arange(numbered if rolling else int(np.ceil(available / lengths.min())) + 1)
     lags = starts[None, :, None] + numbers * lengths[:, None, None]
     inside = (lags >= 0) & (lags <= available - 1)
-    prior = -np.log1p(((rates_hz / nominal_hz - 1.0) / _USUAL_RATE_ERROR) ** 2)
+    prior = log_rate_prior(rates_hz, nominal_hz)
     return Grid(rates_hz, starts, lags, inside, numbers if rolling else np.zeros_like(numbers), prior)
+
+
+def log_rate_prior(rates_hz: Floats, nominal_hz: float) -> Floats:
+    """Log prior of clock rates, shape as the input."""
+    return np.asarray(-np.log1p(((rates_hz / nominal_hz - 1.0) / _USUAL_RATE_ERROR) ** 2))
 
 
 def fold(evidence: Floats, grid: Grid, most: int) -> list[Hypothesis]:

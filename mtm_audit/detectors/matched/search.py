@@ -17,7 +17,7 @@ from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.timing import Timing
 from mtm_audit.tracks import Floats
 from mtm_onboard.protocol.codebook import Codebook
-from mtm_onboard.protocol.scheme import Channel
+from mtm_onboard.protocol.scheme import Channel, Scheme
 
 SEARCHED_RATES = 0.2
 _PHASE_ERROR_RAD = 0.6
@@ -42,12 +42,26 @@ class _Candidate:
     hypothesis: Hypothesis
 
 
-def candidate_rates(rate_hz: float, highest_hz: float, window_s: float) -> Floats:
+def candidate_rates(scheme: Scheme, channel: Channel) -> Floats:
     """Rates over +-20 %, as far apart as the highest tone's phase at a window's ends allows; nominal among them."""
-    step = 2.0 * _PHASE_ERROR_RAD / (np.pi * highest_hz * window_s)
+    window_s = scheme.window_ticks(channel) / scheme.rate_hz
+    step = 2.0 * _PHASE_ERROR_RAD / (np.pi * scheme.band_hz[1] * window_s)
     count = int(np.ceil(SEARCHED_RATES / step))
-    rates: Floats = rate_hz * (1.0 + np.arange(-count, count + 1) * (SEARCHED_RATES / count))
+    rates: Floats = scheme.rate_hz * (1.0 + np.arange(-count, count + 1) * (SEARCHED_RATES / count))
     return rates
+
+
+def lead_cells(scheme: Scheme, channel: Channel, motion: Motion) -> int:
+    """Cells before the recording in which a window may begin that it sees the end of."""
+    return int(np.ceil(scheme.window_ticks(channel) / candidate_rates(scheme, channel)[0] / motion.step_s))
+
+
+def waveform_sets(scheme: Scheme, channel: Channel, motion: Motion) -> int:
+    """How many windows with waveforms of their own a recording may hold: 1 under the fixed schedule."""
+    if scheme.schedule == "fixed":
+        return 1
+    fastest_hz = float(candidate_rates(scheme, channel)[-1])
+    return int(np.ceil(len(motion.seen) * motion.step_s * fastest_hz / scheme.window_ticks(channel)))
 
 
 def search_timings(
@@ -63,10 +77,9 @@ def search_timings(
     """
     scheme, motion = codebooks[0].scheme, prepared.motion
     ticks = scheme.window_ticks(channel)
-    rates_hz = candidate_rates(scheme.rate_hz, scheme.band_hz[1], ticks / scheme.rate_hz)
-    lead = int(np.ceil(ticks / rates_hz[0] / motion.step_s))
-    rolling = scheme.schedule == "rolling"
-    windows = int(np.ceil(len(motion.seen) * motion.step_s * rates_hz[-1] / ticks)) if rolling else 1
+    rates_hz = candidate_rates(scheme, channel)
+    lead = lead_cells(scheme, channel, motion)
+    windows = waveform_sets(scheme, channel, motion)
     tones = [[stacked_tones(codebook, channel, number) for number in range(windows)] for codebook in codebooks]
     spacing = float(rates_hz[1] - rates_hz[0]) / scheme.rate_hz
 

@@ -13,6 +13,9 @@ from mtm_audit.tracks import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel
 
+# A window counts when at least this part of it is in the recording.
+LEAST_PART = 0.3
+
 
 @dataclass(frozen=True)
 class Window:

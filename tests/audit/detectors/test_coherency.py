@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mtm_audit.detectors import make_detector
-from mtm_audit.detectors.base import Reading, combine_repeats, whole_windows
+from mtm_audit.detectors.base import Observation, Reading, combine_repeats, whole_windows
 from mtm_audit.detectors.coherency import CoherencyDetector, rate_searched_scores
 from mtm_audit.glimpse import Glimpse, glimpse_of_track
 from mtm_audit.timing import Timing
@@ -132,3 +132,8 @@ def test_a_reading_holds_where_its_windows_began(glimpse):
     (reading,) = read(KEY, glimpse, 1.0)
     assert isinstance(reading, Reading)
     assert reading.window_starts_s.tolist() == [1.0, 7.0]
+
+
+def test_without_decoys_it_says_what_it_needs(glimpse):
+    with pytest.raises(MtmError, match="decoys and got none; give one decoy at least"):
+        CoherencyDetector().read(KEY.codebook(), [], [Observation(CHANNEL, glimpse)], 1.0)
