@@ -87,7 +87,8 @@ class Control:
             if tick is None:
                 tick = queued.start_tick(_PATIENCE_S) or 0
             self._messages += 1
-        self._note(tick, f"message {message.number} begins here, {_words(content)}")
+        instead = "" if replaced is None else f", in the place of message {_number(replaced)}, which never began"
+        self._note(tick, f"message {message.number} begins here, {_words(content)}{instead}")
         return self._when(tick) | {"number": message.number, "replaces": _number(replaced)}
 
     def _status(self, _: Table) -> Table:
@@ -100,8 +101,11 @@ class Control:
             "tick": session.tick(),
             "sent": stats.sent,
             "missed": stats.missed,
+            "overruns": stats.overruns,
             "clamped": guard.clamped,
             "stale": guard.stale,
+            "held": guard.held,
+            "unsent": guard.unsent,
             "refused": session.source.refused + guard.refused,
             "late_p99_ms": round(1e3 * stats.lateness.quantile_s(0.99), 3),
             "stopped": guard.stopped,

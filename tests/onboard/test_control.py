@@ -111,11 +111,15 @@ def test_the_stop_is_latched_and_noted_in_the_journal(tmp_path):
     header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (0,) * 4, True, 50.0, 0.0, None)
     with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
         robot = Robot(key_of(), 7, journal)
-        assert robot.send(number=3)["tick"] == 120
+        assert [robot.send(number=number)["tick"] for number in (3, 4)] == [120, 120]
         assert robot.control.answer({"command": "stop"}) == {"stopped": True}
         assert robot.guard.admit(BodyVelocity(0.1, 0.0, 0.0), 0.0, 0.0) == STOP
     events = [(event.tick, event.text) for event in read_journal(journal.path).events]
-    assert events == [(120, "message 1 begins here, number 3"), (55, "stop over the control socket")]
+    assert events == [
+        (120, "message 1 begins here, number 3"),
+        (120, "message 2 begins here, number 4, in the place of message 1, which never began"),
+        (55, "stop over the control socket"),
+    ]
 
 
 def test_the_status_says_how_the_run_fares_in_json():
