@@ -162,6 +162,14 @@ def test_a_stream_that_has_only_begun_is_not_enough():
     assert companion.ask(SET_MODE, 1.0, 6.0) == [REJECTED_FOR_NOW]
 
 
+def test_a_stream_that_has_ended_is_not_enough():
+    companion = Companion("px4", is_armed=True)
+    for _ in range(60):
+        companion.setpoint()
+    companion.run(0.5)
+    assert companion.ask(SET_MODE, 1.0, 6.0) == [REJECTED_FOR_NOW]
+
+
 @pytest.mark.parametrize(("name", "number"), [("copter", 4.0), ("rover", 15.0)])
 def test_ardupilot_changes_modes_when_asked_and_arms_when_its_checks_pass(name, number):
     companion = Companion(name)

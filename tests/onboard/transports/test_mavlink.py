@@ -15,7 +15,9 @@ from mtm_onboard.transports.base import TakenOverError
 from mtm_onboard.transports.factory import make_transport
 from mtm_onboard.transports.mavlink import MavlinkTransport
 from mtm_onboard.transports.mavlink_codec import MavlinkCodec
+from mtm_onboard.transports.mavlink_messages import velocity_setpoint
 from mtm_onboard.transports.mavlink_ports import UdpPort
+from mtm_onboard.transports.mavlink_profiles import PROFILES
 from tests.hil.robots.floating_plant import FloatingPlant
 from tests.onboard.transports.conformance import TransportConformance
 from tests.onboard.transports.mavlink_rig import FIRMWARES, line_rig, mavlink_rig
@@ -67,12 +69,12 @@ def names(frames, key=None):
     return [frame.name for frame in read_frames(b"".join(frames), key)]
 
 
-def refusal_of(rig):
+def refusal_of(rig, moved=False):
     with pytest.raises(MtmError) as caught:
         rig.transport.open()
     text = str(caught.value)
     assert text.endswith(".")
-    assert not rig.plant.commands or all(velocity == STOP for _, velocity in rig.plant.commands)
+    assert moved or all(velocity == STOP for _, velocity in rig.plant.commands)
     return text
 
 
@@ -199,6 +201,27 @@ def test_after_a_takeover_only_opening_anew_drives_again():
         assert rig.transport.health()["taken_over"] is False
 
 
+def test_opening_anew_goes_by_what_the_vehicle_says_then_and_not_before():
+    rig = mavlink_rig(open_timeout_s=1.5)
+    with rig.transport:
+        rig.drive(FORWARD)
+        rig.transport.stop()
+        rig.vehicle.pilot_switches(rig.vehicle.firmware.other_mode)
+        assert rig.transport.health()["mode"] == rig.vehicle.firmware.guided_mode
+        assert "is not in GUIDED" in refusal_of(rig, moved=True)
+
+
+def test_opening_brings_a_vehicle_to_a_stand_that_somebody_else_has_set_in_motion():
+    rig = mavlink_rig(vehicle={"goes_on": True})
+    other = MavlinkCodec(1, 190)
+    rig.wire.port.write(other.encode(velocity_setpoint(other.messages, PROFILES["copter"], 1, FORWARD, 0.0)))
+    rig.run(0.01)
+    assert rig.plant.velocity_body == FORWARD
+    with rig.transport:
+        rig.run(0.02)
+        assert rig.plant.velocity_body == STOP
+
+
 def test_stopping_and_closing_neither_disarms_nor_changes_the_mode():
     rig = mavlink_rig()
     with rig.transport:
@@ -299,7 +322,16 @@ def test_px4_that_left_offboard_for_want_of_set_points_counts_as_taken_over():
             rig.transport.send(FORWARD)
 
 
-def test_commands_and_heartbeats_from_two_threads_never_share_a_number():
+@pytest.fixture
+def hasty_threads():
+    """Threads that take turns after a microsecond."""
+    before_s = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before_s)
+
+
+def test_commands_and_heartbeats_from_two_threads_never_share_a_number(hasty_threads):
     rig = mavlink_rig()
     with rig.transport:
         before = len(rig.wire.frames)
