@@ -79,17 +79,18 @@ class Control:
             raise MtmError("the request has no content; give a number, text, hex or symbols")
         with self._one_message_at_a_time:
             message = message_of(content_from_table(content), session.key, self._messages)
-            replaced = modulator.waiting
             queued = modulator.queue(message)
             tick = queued.start_tick(_PATIENCE_S)
-            if tick is None and modulator.withdraw(queued):
-                raise MtmError("the robot's loop stands still and took up no message; see its status and its link")
+            if tick is None and not modulator.withdraw(queued):
+                # It was taken up at this very moment.
+                tick = queued.start_tick(_PATIENCE_S)
             if tick is None:
-                tick = queued.start_tick(_PATIENCE_S) or 0
+                raise MtmError("the robot's loop stands still and took up no message; see its status and its link")
             self._messages += 1
-        instead = "" if replaced is None else f", in the place of message {_number(replaced)}, which never began"
+        replaced = _number(queued.replaced)
+        instead = "" if replaced is None else f", in the place of message {replaced}, which never began"
         self._note(tick, f"message {message.number} begins here, {_words(content)}{instead}")
-        return self._when(tick) | {"number": message.number, "replaces": _number(replaced)}
+        return self._when(tick) | {"number": message.number, "replaces": replaced}
 
     def _status(self, _: Table) -> Table:
         session = self._session

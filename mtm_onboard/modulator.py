@@ -34,10 +34,11 @@ class _Part:
 
 
 class Queued:
-    """A message that waits to be taken up by the loop."""
+    """A message that waits to be taken up by the loop. `replaced` is then the one that waited for the same boundary."""
 
     def __init__(self, message: Message | Sequence[int], noise: Floats, offsets: Floats) -> None:
         self.message = message
+        self.replaced: Message | Sequence[int] | None = None
         self._noise = noise
         self._offsets = offsets
         self._start_tick = 0
@@ -52,8 +53,8 @@ class Queued:
         self._waiting.release()
         return self._start_tick
 
-    def _take(self, start_tick: int, end_tick: float) -> _Part:
-        self._start_tick = start_tick
+    def _take(self, start_tick: int, end_tick: float, replaced: Message | Sequence[int] | None = None) -> _Part:
+        self._start_tick, self.replaced = start_tick, replaced
         self._waiting.release()
         return _Part(self.message, start_tick, end_tick, self._noise, self._offsets)
 
@@ -173,7 +174,7 @@ class Modulator:
         start_tick = self._boundary(tick) * self._message_ticks
         try:
             while True:
-                self._next = self._queue.popleft()._take(start_tick, self._end_tick(start_tick))
+                self._next = self._queue.popleft()._take(start_tick, self._end_tick(start_tick), self.waiting)
         except IndexError:
             # All are taken, or the one that was seen has been withdrawn.
             pass

@@ -163,6 +163,7 @@ def test_the_last_of_several_queued_before_a_boundary_is_played_and_each_hears_t
     second, third = modulator.queue((2,)), modulator.queue((3,))
     played(modulator, range(10, 121))
     assert {one.start_tick(0.0) for one in (first, second, third)} == {120}
+    assert [one.replaced for one in (first, second, third)] == [None, (1,), (2,)]
     assert (modulator.message, modulator.waiting) == ((3,), None)
 
 
