@@ -1,29 +1,38 @@
-"""Simulated robots behind pseudo-terminals, which a program in another process takes for serial devices."""
+"""Simulated robots that a program in another process takes for real: behind pseudo-terminals and UDP ports."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from hil.rig import Wire
 from hil.robots.can_node import CanMotionController
+from hil.robots.mavlink_firmware import COPTER
+from hil.robots.mavlink_vehicle import MavlinkVehicle
 from hil.robots.motion_controller import MotionController, Plant
 from hil.robots.plaintext_node import PlaintextMotionController
 from hil.robots.plaintext_ports import PtyPort
 from hil.robots.slcan_port import SlcanPort
+from mtm_onboard.transports.mavlink_ports import UdpPort
 
 
 @dataclass(frozen=True)
 class SerialWire:
-    """One robot: the TOML fields of [transport] that reach it, what it does each period, and what it found wrong."""
+    """One robot: the TOML fields of [transport] that reach it, what it does each period, and what it found wrong.
+
+    `lets_go` says whether a stop over this wire switches the motors off as well.
+    """
 
     transport: str
     controller: MotionController
     poll: Callable[[float], None]
     faults: Callable[[], int]
     shutdown: Callable[[], None]
+    lets_go: bool = True
 
 
 def serial_wire(wire: Wire, plant: Plant) -> SerialWire:
-    """`plant` behind a UART for the wire "plaintext", and behind a serial CAN adapter otherwise."""
+    """`plant` behind a UART for "plaintext", a UDP port for "mavlink", and a serial CAN adapter otherwise."""
+    if wire == "mavlink":
+        return _autopilot(plant)
     return _uart(plant) if wire == "plaintext" else _can_adapter(plant)
 
 
@@ -44,3 +53,14 @@ def _uart(plant: Plant) -> SerialWire:
     node = PlaintextMotionController(MotionController(plant, deadman_s=None), [port])
     transport = f'kind = "robomaster-uart"\nport = "{port.path}"'
     return SerialWire(transport, node.controller, node.poll, lambda: node.faults, port.shutdown)
+
+
+def _autopilot(plant: Plant) -> SerialWire:
+    port = UdpPort(listen=("127.0.0.1", 0))
+    vehicle = MavlinkVehicle(COPTER, plant, port, is_guided=True, is_armed=True)
+
+    def faults() -> int:
+        return vehicle.refused_frames + vehicle.ignored_setpoints + vehicle.port_errors + vehicle.controller.faults
+
+    transport = f'kind = "mavlink"\nprofile = "copter"\nendpoint = "udpout:127.0.0.1:{port.number}"'
+    return SerialWire(transport, vehicle.controller, vehicle.poll, faults, port.close, lets_go=False)

@@ -27,7 +27,8 @@ class RecordOptions:
     """What the command line asked for.
 
     `message` None moves the robots without one, `key` None makes a key, `camera` None films nothing. `realtime` runs
-    the onboard programs on UARTs when `wire` is plaintext and on serial CAN adapters otherwise.
+    the onboard programs on UARTs when `wire` is plaintext, over UDP when it is MAVLink and on serial CAN adapters
+    otherwise.
     """
 
     out: Path

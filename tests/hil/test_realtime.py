@@ -39,8 +39,8 @@ def test_a_journal_that_shows_a_failed_run_is_refused(record, sentence):
 
 
 @pytest.mark.realtime
-@pytest.mark.parametrize("wire", ["can", "plaintext"])
-def test_four_onboard_programs_drive_four_robots_through_serial_devices(tmp_path, wire):
+@pytest.mark.parametrize("wire", ["can", "plaintext", "mavlink"])
+def test_four_onboard_programs_drive_four_robots_through_serial_devices_or_udp(tmp_path, wire):
     settings = short_run(key=fake_key(100), seconds=6.0, start_s=3.5, wire=wire)
     save_key(settings.key, tmp_path / "robot.key")
     result = run_realtime(settings, tmp_path / "robot.key", tmp_path)
