@@ -126,7 +126,7 @@ def false_alarms(
 
 @app.command()
 def frames(
-    count: Annotated[int, typer.Option("-n", min=200, help="Frames for each check and for each attack.")] = 10_000,
+    count: Annotated[int, typer.Option("-n", min=200, help="Frames under noise for each check.")] = 10_000,
     seed: Annotated[int, typer.Option(min=0, help="The first cell's seed.")] = 0,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,

@@ -33,7 +33,7 @@ class Codewords:
 def likeliest_codewords(ratios: Floats, layout: Layout, count: int) -> Codewords:
     """The likeliest codewords found for log-likelihood ratios (L, M) in nats; rows of zeros stand for unseen symbols.
 
-    `count` of them at most come from the information set, and few more from algebra.
+    `count` of them at most, which is two or more, come from the information set, and few more from algebra.
     """
     carrying = layout.code_symbols * layout.group
     seen = ratios[:carrying]

@@ -83,6 +83,15 @@ def test_the_frame_is_number_payload_tag_and_filler_most_significant_bit_first()
     assert symbols == (*(int(digit, 16) for digit in "ab1234" + tag.hex()), 0, 0)
 
 
+def test_the_examples_of_the_documentation_hold():
+    tagged = plain_row(CODED, 16, 17)
+    symbols = encode_frame(4660, tagged, FAKE_SECRET, number=1451, epoch=9)
+    assert "".join(f"{symbol:x}" for symbol in symbols) == "ab1234" + "5249d9" + "1659" + "0"
+    checked = plain_row(Framing("text", 24, check="crc", check_bits=16), 16, 13)
+    symbols = encode_frame("hé", checked, FAKE_SECRET, epoch=9)
+    assert "".join(f"{symbol:x}" for symbol in symbols) == "9a30ea4961800"
+
+
 def test_short_bytes_are_padded_and_their_length_less_one_comes_first():
     scheme = plain_row(Framing("bytes", 4 * 8), 4, 17)
     assert encode_frame(b"\xe4", scheme, FAKE_SECRET) == (0, 3, 2, 1, 0, *[0] * 12)
