@@ -24,6 +24,7 @@ class WireName(StrEnum):
 
     CAN = "can"
     PLAINTEXT = "plaintext"
+    MAVLINK = "mavlink"
     DIRECT = "direct"
 
 
@@ -47,12 +48,12 @@ def record(
     no_message: Annotated[bool, typer.Option("--no-message", help="Move without a message.")] = False,
     seconds: Annotated[float, typer.Option(help="Length of the recording.")] = 26.0,
     key: Annotated[Path | None, typer.Option(help="The key file; one is made in the folder without it.")] = None,
-    wire: Annotated[WireName, typer.Option(help="The robots' CAN or plaintext protocol, or no wire.")] = WireName.CAN,
+    wire: Annotated[WireName, typer.Option(help="CAN, plaintext or MAVLink protocol, or no wire.")] = WireName.CAN,
     seed: Annotated[int, typer.Option(min=0, help="Decides everything random but the message's waveforms.")] = 0,
     camera: Annotated[CameraName, typer.Option(help="Which camera films.")] = CameraName.OVERHEAD,
     no_video: Annotated[bool, typer.Option("--no-video", help="Motion capture alone.")] = False,
     realtime: Annotated[
-        bool, typer.Option("--realtime", help="Run the onboard programs in processes of their own, on serial devices.")
+        bool, typer.Option("--realtime", help="Run the onboard programs in processes of their own, on real ports.")
     ] = False,
 ) -> None:
     """Record four simulated robots: motion capture, video, and what was sent."""
