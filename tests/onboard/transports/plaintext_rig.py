@@ -5,7 +5,7 @@ import select
 import socket
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 
 from hil.clock import SimulatedClock
 from hil.robots.motion_controller import MotionController
@@ -108,10 +108,14 @@ class PlaintextRig:
 
     def clog(self) -> None:
         """Leave no room in the line, from which nobody reads until the clock goes on."""
-        descriptor = self.links[-1]._descriptor
-        while select.select([], [descriptor], [], 0.05)[1]:
-            with suppress(BlockingIOError):
-                os.write(descriptor, b" " * 4096)
+        descriptor, deadline_s = self.links[-1]._descriptor, time.monotonic() + PATIENCE_S
+        while time.monotonic() < deadline_s:
+            try:
+                os.write(descriptor, b" " * 64)
+            except BlockingIOError:
+                if not select.select([], [descriptor], [], 0.05)[1]:
+                    return
+        raise AssertionError("the line never filled")
 
     def cut(self) -> None:
         self.is_cut = True
@@ -133,6 +137,8 @@ class PlaintextRig:
         if kind == "tcp":
             push_port = free_udp_port()
             tcp_port = TcpPort(push_port=push_port)
+            # Or it would take megabytes before it were full.
+            tcp_port._listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             return lambda: RoboMasterTcp("127.0.0.1", tcp_port.port, push_port), tcp_port
         ours, theirs = socket.socketpair()
         self.ends = [ours, theirs]
