@@ -1,5 +1,6 @@
 """DJI's messages over a CAN bus, where each CAN id is one stream of bytes."""
 
+import errno
 import select
 import time
 from typing import TYPE_CHECKING, Protocol
@@ -11,9 +12,7 @@ from mtm_onboard.transports.duml import Message, Parser, encode, segment
 if TYPE_CHECKING:
     import can
 
-# Above a busy host's own stalls, which pyserial takes for a line that is full, and below the robot's deadman.
-_WRITE_WITHIN_S = 0.1
-# A timeout of zero would have pyserial write a part of a frame and say nothing.
+_WRITE_WITHIN_S = 0.1  # below the robot's deadman
 _SHORTEST_TIMEOUT_S = 0.001
 _MOST_FRAMES_A_READ = 512  # so that a babbling bus cannot hold its reader for ever
 
@@ -61,13 +60,11 @@ class CanStream:
         deadline_s = time.monotonic() + within_s
         try:
             for data in segment(encode(message)):
-                frame = self._frame(arbitration_id=self._send_id, is_extended_id=False, data=data)
-                self._bus.send(frame, timeout=max(_SHORTEST_TIMEOUT_S, deadline_s - time.monotonic()))
+                self._send(self._frame(arbitration_id=self._send_id, is_extended_id=False, data=data), deadline_s)
         except self._errors as error:
-            if time.monotonic() >= deadline_s:
-                raise LinkBusyError(
-                    f"The CAN bus took no frame in time ({error}); check the wiring and that the robot is on."
-                ) from error
+            # A queue that is full is a bus on which nobody acknowledges, or one that is busy for a moment.
+            if getattr(error, "error_code", None) == errno.ENOBUFS or time.monotonic() >= deadline_s:
+                raise _busy(str(error)) from error
             raise MtmError(f"The CAN bus refused a frame ({error}); check the wiring and the robot's power.") from error
 
     def read(self) -> list[Message]:
@@ -98,6 +95,17 @@ class CanStream:
             if serial_port is not None:
                 serial_port.close()
 
+    def _send(self, frame: "can.Message", deadline_s: float) -> None:
+        remaining_s = max(_SHORTEST_TIMEOUT_S, deadline_s - time.monotonic())
+        if self._descriptor is None:
+            self._bus.send(frame, timeout=remaining_s)
+            return
+        # Asked of the descriptor, since pyserial takes a host that stalled after its write for a line that is full,
+        # and then half a message would have left. What is writable takes a frame at once.
+        if not select.select((), [self._descriptor], (), remaining_s)[1]:
+            raise _busy("the line is full")
+        self._bus.send(frame, timeout=0)
+
     def _is_quiet(self) -> bool:
         """Whether nothing waits behind the bus's file descriptor; False when it has none.
 
@@ -113,3 +121,7 @@ def _descriptor(bus: Bus) -> int | None:
     except (AttributeError, NotImplementedError):
         return None
     return descriptor if descriptor >= 0 else None
+
+
+def _busy(why: str) -> LinkBusyError:
+    return LinkBusyError(f"The CAN bus took no frame in time ({why}); check the wiring and that the robot is on.")

@@ -61,8 +61,6 @@ class RoboMasterCan(Transport):
     """
 
     service_period_s = HEARTBEAT_PERIOD_S
-    # A control period: above most of a host's own stalls, which pyserial takes for a line that is full.
-    write_bound_s = 0.02
 
     def __init__(self, bus: Bus | None = None, **bus_options: Any) -> None:
         if (bus is None) == (not bus_options):

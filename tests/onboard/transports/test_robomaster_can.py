@@ -1,9 +1,12 @@
+import errno
 import math
 import threading
+from types import SimpleNamespace
 
 import can
 import pytest
 
+from hil.robots.slcan_port import SlcanPort
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.transports.base import LinkBusyError
@@ -211,6 +214,47 @@ def test_a_slow_bus_holds_a_command_up_for_no_longer_than_the_write_bound(monkey
         assert bus.now_s <= transport.write_bound_s + 0.004
     bus.is_slow = False
     transport.send(FORWARD)
+
+
+def test_a_full_transmit_queue_is_a_busy_bus_and_no_broken_one():
+    class FullQueue(BrokenBus):
+        def send(self, msg, timeout=None):
+            if self.refused:
+                raise can.CanOperationError("Failed to transmit: No buffer space available", errno.ENOBUFS)
+            super().send(msg, timeout)
+
+    bus = FullQueue(())
+    transport = RoboMasterCan(bus)
+    transport.open()
+    bus.refused = True
+    with pytest.raises(LinkBusyError, match="No buffer space"):
+        transport.send(FORWARD)
+    bus.refused = ()
+    transport.send(FORWARD)
+
+
+def test_a_serial_adapter_is_never_waited_for_until_it_has_drained(monkeypatch):
+    port = SlcanPort()
+    transport = RoboMasterCan(interface="slcan", channel=port.path, sleep_after_open=0)
+    transport.open()
+    monkeypatch.setattr("serial.serialposix.termios.tcdrain", lambda _: pytest.fail("waited without bound"))
+    transport.send(FORWARD)
+    monkeypatch.undo()
+    transport.stop()
+    transport.close()
+    port.shutdown()
+
+
+def test_the_port_of_an_adapter_that_takes_no_farewell_is_released():
+    class Gone(BrokenBus):
+        def shutdown(self):
+            raise can.CanOperationError("Could not write to serial device")
+
+    bus, closed = Gone(()), []
+    bus.serialPortOrig = SimpleNamespace(close=lambda: closed.append(True))
+    with RoboMasterCan(bus):
+        pass
+    assert closed == [True]
 
 
 def test_a_command_does_not_wait_longer_for_a_heartbeat_that_is_stuck():
