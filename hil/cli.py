@@ -172,14 +172,15 @@ def robustness(
 def sweep(
     world: Annotated[str, typer.Argument(metavar="WORLD", help="The world to measure: robomaster.")],
     out: Annotated[Path, typer.Option(help="The accuracy table to write, for mtm-audit plan.")],
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each M and window.")] = 40,
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each M and window.")] = 50,
     alphabet: Annotated[
         list[int] | None, typer.Option(metavar="M", help="Alphabet size; may be repeated (default: 4, 16, 64).")
     ] = None,
     window: Annotated[
         list[int] | None,
-        typer.Option(metavar="TICKS", min=1, help="Window; may be repeated (default: 25, 50, 75, 100, 150)."),
+        typer.Option(metavar="TICKS", min=1, help="Window; may be repeated (default: 30, 45, 60, 80, 110, 150)."),
     ] = None,
+    windows: Annotated[int, typer.Option(min=1, help="Windows in a row, about as many as a message will have.")] = 2,
     scheme: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Measure this scheme's own windows, and whole messages.")
     ] = None,
@@ -198,6 +199,7 @@ def sweep(
             rollouts,
             tuple(alphabet or ()),
             tuple(window or ()),
+            windows,
             scheme,
             detector,
             first_seed,

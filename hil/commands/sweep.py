@@ -12,17 +12,21 @@ from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.schemefile import load_scheme
 
 _ALPHABET_SIZES = (4, 16, 64)
-_WINDOW_TICKS = (25, 50, 75, 100, 150)
+_WINDOW_TICKS = (30, 45, 60, 80, 110, 150)
 
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """What the command line asked for: `scheme`, or a grid of alphabets and windows (the usual ones where empty)."""
+    """What the command line asked for: `scheme`, or a grid of alphabets and windows (the usual ones where empty).
+
+    `windows` of the grid are sent in a row, which a scheme decides itself.
+    """
 
     world: str
     rollouts: int
     alphabet_sizes: tuple[int, ...]
     window_ticks: tuple[int, ...]
+    windows: int
     scheme: Path | None
     detector: str
     first_seed: int
@@ -36,8 +40,11 @@ def sweep(options: SweepOptions, console: Console) -> None:
     world_of(options.world)
     if options.scheme is None:
         schemes = grid(
-            options.world, options.alphabet_sizes or _ALPHABET_SIZES, options.window_ticks or _WINDOW_TICKS
-        )  # fmt: skip
+            options.world,
+            options.alphabet_sizes or _ALPHABET_SIZES,
+            options.window_ticks or _WINDOW_TICKS,
+            options.windows,
+        )
     elif options.alphabet_sizes or options.window_ticks:
         raise MtmError("a scheme has its own alphabet and windows; leave out --alphabet and --window")
     else:
@@ -61,7 +68,7 @@ def sweep(options: SweepOptions, console: Console) -> None:
 def _command(options: SweepOptions) -> str:
     what = [f"--alphabet {size}" for size in options.alphabet_sizes]
     what += [f"--window {ticks}" for ticks in options.window_ticks]
-    what += [] if options.scheme is None else [f"--scheme {options.scheme}"]
+    what += [f"--windows {options.windows}"] if options.scheme is None else [f"--scheme {options.scheme}"]
     return " ".join(
         [f"mtm-hil sweep {options.world} -n {options.rollouts}", *what, f"--detector {options.detector}",
          f"--first-seed {options.first_seed} --out {options.out}"]

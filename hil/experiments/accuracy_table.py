@@ -14,10 +14,6 @@ from hil.worlds.robomaster import fleet_scheme
 from mtm_audit.planning.table import AccuracyPoint, AccuracyTable, members_of
 from mtm_onboard.protocol import MtmError, Scheme
 
-# Windows of one rollout follow each other as in a message; the task ends after about half a minute.
-_MOST_WINDOWS, _FEWEST_WINDOWS = 4, 2
-_ROLLOUT_TICKS = 1200
-
 
 @dataclass(frozen=True)
 class World:
@@ -65,11 +61,15 @@ def world_of(name: str) -> World:
     return WORLDS[name]
 
 
-def grid(world: str, alphabet_sizes: Sequence[int], window_ticks: Sequence[int]) -> tuple[Scheme, ...]:
-    """One scheme for each M and t; raises MtmError when one of them cannot be played."""
+def grid(world: str, alphabet_sizes: Sequence[int], window_ticks: Sequence[int], windows: int) -> tuple[Scheme, ...]:
+    """One scheme for each M and t, with so many windows in a row; raises MtmError when one cannot be played.
+
+    A detector that learns from all windows of a recording is the more accurate the more there are, so `windows` should
+    be about what a channel will send in one message.
+    """
     make = world_of(world).scheme
     return tuple(
-        make(alphabet, ticks, max(_FEWEST_WINDOWS, min(_MOST_WINDOWS, _ROLLOUT_TICKS // ticks)))
+        make(alphabet, ticks, windows)
         for alphabet in dict.fromkeys(alphabet_sizes)
         for ticks in dict.fromkeys(window_ticks)
     )

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from mtm_audit.planning.check import check
+from mtm_audit.planning.check import check_all
 from mtm_audit.planning.plan import Plan, Problem
 from mtm_audit.planning.provision import scheme_of_plan
-from mtm_audit.planning.report import check_text, corrections, fastest, headline, remarks, rich_table
+from mtm_audit.planning.report import check_lines, corrections, fastest, headline, remarks, rich_table
 from mtm_audit.planning.search import Found, search
 from mtm_audit.planning.table import read_table
 from mtm_audit.plot import check_plot_path
@@ -46,8 +46,10 @@ def run_plan(options: PlanOptions) -> int:
     rate_hz = options.rate_hz or (like.rate_hz if like else 0.0)
     found = search(table, options.problem)
     scheme = _scheme(options, found, like)
-    checks = [] if held_out is None else [check(one.plan, held_out) for one in found if one.plan and one.meets_target]
+    checks = [] if held_out is None else check_all([one.plan for one in found if one.plan], held_out)
     lines = [*remarks(table, options.problem, found), *corrections(table, options.problem, found, rate_hz)]
+    if held_out is not None:
+        lines += check_lines(found, checks)
     if options.plot is not None:
         from mtm_audit.planning.draw import draw_plan
 
@@ -58,7 +60,7 @@ def run_plan(options: PlanOptions) -> int:
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
     console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS)
     console.print(rich_table(found, options.problem, rate_hz), highlight=False)
-    for line in (*lines, *map(check_text, checks), *(f"wrote {path}" for path in (options.out, options.plot) if path)):
+    for line in (*lines, *(f"wrote {path}" for path in (options.out, options.plot) if path)):
         print(line)
     return 0 if all(one.agrees for one in checks) else DISAGREES
 

@@ -1,5 +1,6 @@
 """Whether a prediction holds on a table that was measured on other recordings."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mtm_audit.planning.curve import fit_curve
@@ -20,6 +21,20 @@ class Checked:
         """Whether the two 95 % intervals of the message's accuracy overlap."""
         (low, high), (other_low, other_high) = self.plan.interval, self.measured.interval
         return low <= other_high and other_low <= high
+
+
+def check_all(plans: Sequence[Plan], held_out: AccuracyTable) -> list[Checked]:
+    """Check the plans whose windows the held-out table reaches; raises MtmError when it reaches none."""
+    checked: list[Checked] = []
+    refusals: list[MtmError] = []
+    for plan in plans:
+        try:
+            checked.append(check(plan, held_out))
+        except MtmError as refusal:
+            refusals.append(refusal)
+    if not checked:
+        raise refusals[0]
+    return checked
 
 
 def check(plan: Plan, held_out: AccuracyTable) -> Checked:

@@ -89,8 +89,17 @@ def corrections(table: AccuracyTable, problem: Problem, found: Sequence[Found], 
         )
 
 
-def check_text(checked: Checked) -> str:
-    """Prediction beside measurement, and whether they agree."""
+def check_lines(found: Sequence[Found], checks: Sequence[Checked]) -> Iterator[str]:
+    """For each plan, prediction beside measurement, or that the held-out table does not have its windows."""
+    by_strategy = {checked.plan.strategy: checked for checked in checks}
+    for one in found:
+        if one.strategy in by_strategy:
+            yield _check_text(by_strategy[one.strategy])
+        elif one.plan is not None:
+            yield f"{one.strategy}: not checked, since the held-out table does not have its windows"
+
+
+def _check_text(checked: Checked) -> str:
     plan, measured = checked.plan, checked.measured
     basis = "at exactly these windows" if measured.is_measured else "interpolated"
     return (

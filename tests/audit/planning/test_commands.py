@@ -1,0 +1,226 @@
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from mtm_audit.cli import main
+from mtm_audit.planning.table import AccuracyPoint, AccuracyTable, read_table, write_table
+from mtm_onboard.cli import main as onboard
+from mtm_onboard.protocol import Channel, Key, Scheme, load_key, save_key
+from tests.audit.planning.paper import paper_table
+
+LANDER = paper_table("lander")
+JOB = ("--bits", "10", "--rate", "50", "--alphabet", "4", "--measured-only")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_table(tmp_path / "lander.csv", LANDER)
+    channels = tuple(Channel(name, "lander", (name,), 1, 0.5) for name in ("x", "y"))
+    scheme = Scheme("lander", 50.0, (0.5, 5.0), 8, 300, channels, power="ensemble")
+    save_key(Key("fake", b"not a real secret, only for test", scheme), tmp_path / "lander.key")
+    return tmp_path
+
+
+@pytest.fixture
+def audit(folder, capsys, monkeypatch):
+    """Run mtm-audit in the folder; gives the exit code, standard output and standard error."""
+    monkeypatch.chdir(folder)
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as left:
+            main([*map(str, arguments)])
+        out, err = capsys.readouterr()
+        assert "Traceback" not in out + err
+        return left.value.code or 0, out, err
+
+    return run
+
+
+def test_a_plan_names_the_fastest_scheme_first_and_then_one_line_a_strategy(audit):
+    code, out, err = audit("plan", "lander.csv", *JOB)
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == "fastest for 10 bits at 0.9: split, M = 4, T = 576 (11.52 s)"
+    titles = "scheme M L T seconds bits/s accuracy interval symbols"
+    assert [word for word in lines[1].split() if word in titles.split()] == titles.split()
+    assert [line.split()[:6] for line in lines[2:5]] == [
+        ["single", "4", "5", "1200", "24.00", "0.417"],
+        ["same", "4", "5", "960", "19.20", "0.521"],
+        ["split", "4", "5", "576", "11.52", "0.868"],
+    ]
+    assert "0.912" in lines[4]
+    assert lines[4].rstrip().endswith("x 2 x 288, y 3 x 192")
+    assert any(line.startswith("split: RS(5,3) over GF(16), which corrects 1, would take T = 1152") for line in lines)
+    assert not any("interpolated" in line for line in lines)
+
+
+def test_interpolation_is_said(audit):
+    assert "lie between measured ones, so the accuracy is interpolated" in audit("plan", "lander.csv", *JOB[:-1])[1]
+
+
+def test_the_scheme_file_is_provisioned_as_a_key(audit, folder):
+    code, out, _ = audit("plan", "lander.csv", *JOB[:2], *JOB[4:], "--like", "lander.key", "--out", "plan.toml")
+    assert code == 0
+    assert out.endswith("wrote plan.toml\n")
+    assert onboard(["keygen", "--id", "fake-key", "--scheme", "plan.toml", "--out", "planned.key"]) == 0
+    scheme = load_key(folder / "planned.key").scheme
+    assert (scheme.alphabet_size, scheme.message_ticks, scheme.combine) == (4, 576, "split")
+    assert [(channel.name, channel.body, channel.symbols) for channel in scheme.channels] == [
+        ("x", "lander", 2), ("y", "lander", 3),
+    ]  # fmt: skip
+    assert (scheme.band_hz, scheme.power) == ((0.5, 5.0), "ensemble")
+
+
+def test_another_strategy_can_be_written(audit):
+    chosen = ("--like", "lander.key", "--out", "plan.toml", "--strategy", "same")
+    assert audit("plan", "lander.csv", *JOB[:2], *JOB[4:], *chosen)[0] == 0
+    with open("plan.toml", "rb") as file:
+        scheme = tomllib.load(file)["scheme"]
+    assert (scheme["combine"], scheme["message_ticks"]) == ("same", 960)
+    assert [channel["symbols"] for channel in scheme["channels"]] == [5, 5]
+
+
+def held_out(change):
+    """The Lander's table with other successes."""
+    points = [
+        AccuracyPoint(p.channel, p.alphabet_size, p.window_ticks, change(p.successes, p.trials), p.trials)
+        for p in LANDER.points
+    ]
+    return AccuracyTable(tuple(points))
+
+
+def test_a_check_says_whether_held_out_measurements_agree(audit):
+    write_table(Path("near.csv"), held_out(lambda right, of: min(of, right + 2)))
+    code, out, _ = audit("plan", "lander.csv", *JOB, "--check", "near.csv")
+    assert code == 0
+    assert out.count("at exactly these windows: the intervals agree") == 3
+    write_table(Path("far.csv"), held_out(lambda right, of: right // 2))
+    code, out, _ = audit("plan", "lander.csv", *JOB, "--check", "far.csv")
+    assert code == 4
+    assert "split: predicted 0.912 [" in out
+    assert out.count("the intervals do NOT agree") == 3
+
+
+def test_a_check_that_reaches_no_window_names_the_one_to_measure(audit):
+    write_table(Path("short.csv"), AccuracyTable(tuple(p for p in LANDER.points if p.window_ticks < 100)))
+    code, out, err = audit("plan", "lander.csv", *JOB, "--check", "short.csv")
+    assert (code, out) == (1, "")
+    assert "says nothing of x at M = 4 in windows of 240 ticks; measure that cell" in err
+
+
+def test_a_check_of_one_scheme_leaves_the_others_and_says_so(audit):
+    cells = {("x", 4, 288), ("y", 4, 192)}
+    split = [point for point in LANDER.points if (point.channel, point.alphabet_size, point.window_ticks) in cells]
+    write_table(Path("split.csv"), AccuracyTable(tuple(split)))
+    code, out, _ = audit("plan", "lander.csv", *JOB, "--check", "split.csv")
+    assert code == 0
+    assert out.count("not checked, since the held-out table does not have its windows") == 2
+    assert "split: predicted 0.912" in out
+
+
+@pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
+def test_a_picture_is_drawn(audit, suffix):
+    code, out, _ = audit("plan", "lander.csv", *JOB[:-1], "--plot", f"plan.{suffix}")
+    assert code == 0
+    assert out.endswith(f"wrote plan.{suffix}\n")
+    assert Path(f"plan.{suffix}").stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--bits", "5000", "--rate", "50"), "send a longer payload in several messages"),
+        (("--bits", "10", "--rate", "50", "--accuracy", "1.2"), "choose one above 0 and below 1"),
+        (("--bits", "10", "--rate", "50", "--accuracy", "0.99999"), "lower the target, shorten the payload, or"),
+        (("--bits", "10", "--rate", "50", "--alphabet", "16"), "the table has no M = 16; choose of 2, 4, 8"),
+        (("--bits", "10", "--rate", "50", "--out", "plan.toml"), "give a key of these robots with --like"),
+        (("--bits", "10", "--rate", "50", "--plot", "plan.doc"), "is no picture format"),
+        (("--bits", "10", "--rate", "50", "--check", "none.csv"), "cannot read the accuracy table none.csv"),
+        (("--bits", "10", "--like", "lander.csv"), "can be read by others"),
+    ],
+)
+def test_what_cannot_be_planned_is_refused_in_one_sentence_and_nothing_is_written(audit, folder, options, says):
+    before = sorted(os.listdir(folder))
+    code, out, err = audit("plan", "lander.csv", *options)
+    assert (code, out) == (1, "")
+    assert err.startswith("mtm-audit: ")
+    assert err.count("\n") == 1
+    assert says in err
+    assert sorted(os.listdir(folder)) == before
+
+
+def test_a_key_without_the_plan_s_channels_is_refused(audit, folder):
+    write_table(folder / "other.csv", AccuracyTable((AccuracyPoint("z", 4, 100, 99, 100),)))
+    code, _, err = audit("plan", "other.csv", "--bits", "2", "--like", "lander.key", "--out", "plan.toml")
+    assert code == 1
+    assert "no channel 'z'; choose one of: x, y" in err
+    assert not (folder / "plan.toml").exists()
+
+
+@pytest.mark.parametrize("options", [(), ("--rate", "50", "--like", "lander.key")])
+def test_the_rate_comes_from_one_place(audit, options):
+    code, _, err = audit("plan", "lander.csv", "--bits", "10", *options)
+    assert code == 2
+    assert "--rate" in err
+
+
+def test_a_plan_that_breaks_off_leaves_the_former_scheme(audit, folder, monkeypatch):
+    def interrupted(*_args, **_kwargs):
+        raise KeyboardInterrupt
+
+    (folder / "plan.toml").write_text("the former one")
+    monkeypatch.setattr("mtm_onboard.protocol.schemefile.scheme_text", interrupted)
+    code, out, err = audit("plan", "lander.csv", *JOB[:2], *JOB[4:], "--like", "lander.key", "--out", "plan.toml")
+    assert (code, out) == (130, "")
+    assert err == "mtm-audit: interrupted; nothing was written\n"
+    assert (folder / "plan.toml").read_text() == "the former one"
+    assert not [name for name in os.listdir(folder) if name.startswith(".")]
+
+
+def test_duration_is_in_seconds(audit):
+    code, out, _ = audit("duration", "lander.csv", "--key", "lander.key", "--accuracy", "0.9")
+    assert code == 0
+    # One window of 300 ticks on x and on y, M = 8: x has 99.8 % and y 99.3 % at 288.
+    assert (
+        out.splitlines()[0]
+        == "12.00 s of motion, wherever in a message it begins (1 message of 300 ticks and one window)"
+    )
+    assert out.splitlines()[1] == "6.00 s when it begins with a message"
+    assert "of 6 bits; 1 bits/s" in out
+
+
+def test_a_payload_too_long_for_the_key_is_refused(audit):
+    code, out, err = audit("duration", "lander.csv", "--key", "lander.key", "--bits", "7")
+    assert (code, out) == (1, "")
+    assert "a message of this key carries 1 to 6 bits" in err
+
+
+def test_the_overhead_table_is_printed_as_in_the_paper(audit):
+    code, out, _ = audit("overhead")
+    assert code == 0
+    assert [line.split() for line in out.splitlines()] == [
+        ["errors", "best", "code", "M=8", "M=4", "M=2"],
+        ["1", "RS(7,5)", "1.4x", "2.8x", "4.2x"],
+        ["2", "RS(7,3)", "2.3x", "4.7x", "7.0x"],
+        ["3", "RS(7,1)", "7.0x", "14x", "21x"],
+    ]
+
+
+def test_help_loads_neither_the_planner_nor_opencv():
+    code = (
+        "import sys\nfrom mtm_audit.cli import main\n"
+        "try: main(['plan', '--help'])\nexcept SystemExit: pass\n"
+        "print([n for n in ('scipy', 'cv2', 'mtm_audit.planning') if n in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_the_table_that_the_project_measured_can_be_planned_with(audit):
+    path = Path(__file__).parents[3] / "hil/experiments/results/accuracy_table.csv"
+    assert len(read_table(path).channels) == 15
+    assert audit("plan", path, "--bits", "8", "--rate", "50")[0] == 0
