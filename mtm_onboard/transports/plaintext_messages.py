@@ -29,7 +29,8 @@ QUIT: Final = b"quit;"
 _LONGEST_TEXT = 512
 _ANSWER = re.compile(r"(.*?)(?: seq ([0-9]{1,9}))?")
 _DONE = frozenset({"ok", "Already in SDK mode"})
-_REFUSED = re.compile(r"fail|error|quit sdk mode failed|not in sdk mode|command format error.*|.* exec error")
+_OUTSIDE = "not in sdk mode"
+_REFUSED = re.compile(rf"fail|error|quit sdk mode failed|{_OUTSIDE}|command format error.*|.* exec error")
 _NUMBER = re.compile(r"[+-]?[0-9]{1,9}(?:\.[0-9]{1,9})?")
 _PUSH_PREFIX = "chassis push "
 _PUSH_NUMBERS = {"position": (2, 3), "attitude": (3,)}
@@ -37,10 +38,14 @@ _PUSH_NUMBERS = {"position": (2, 3), "attitude": (3,)}
 
 @dataclass(frozen=True)
 class Answer:
-    """What the robot says to one command: whether it obeyed, and the command's number when it had one."""
+    """What the robot says to one command: whether it obeyed, and the command's number when it had one.
+
+    `is_outside` says that it did not since it is not in SDK mode, as after it was switched off and on.
+    """
 
     obeyed: bool
     sequence: int | None
+    is_outside: bool = False
 
 
 @dataclass(frozen=True)
@@ -106,7 +111,7 @@ def parse_piece(text: str) -> Piece:
         return _pushed(words[0], words[1:])
     match = _ANSWER.fullmatch(text)
     if match is not None and (match[1] in _DONE or _REFUSED.fullmatch(match[1])):
-        return Answer(match[1] in _DONE, None if match[2] is None else int(match[2]))
+        return Answer(match[1] in _DONE, None if match[2] is None else int(match[2]), match[1] == _OUTSIDE)
     raise ValueError(f"{text[:80]!r} is no answer and no push")
 
 

@@ -50,8 +50,9 @@ class RoboMasterPlaintext(Transport):
     """One RoboMaster EP in SDK mode. `open` does not wait for the robot's answers; `service` reads them.
 
     The robot answers every command. When the last `MOST_UNANSWERED` are without an answer (it is off, it lags behind,
-    or it obeys another link: the first to enter SDK mode wins, and others meet silence) the link counts as down. The
-    robot has no deadman: it keeps the last speed until the next one, `quit`, or the end of a TCP connection.
+    or it obeys another link: the first to enter SDK mode wins, and others meet silence) the link counts as down, as it
+    does when the robot says that it is not in SDK mode. The robot has no deadman: it keeps the last speed until the
+    next one, `quit`, or the end of a TCP connection.
 
     `answers` counts commands that were obeyed, `refusals` those that were not, `malformed` texts that nobody could
     have meant, `link_errors` reads and writes that failed.
@@ -244,3 +245,5 @@ class RoboMasterPlaintext(Transport):
             self._answered = answer.sequence
         self.answers += answer.obeyed
         self.refusals += not answer.obeyed
+        if answer.is_outside:
+            self._lost = MtmError("The robot has left SDK mode; check that it was not switched off and on.")

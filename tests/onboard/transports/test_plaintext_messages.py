@@ -60,7 +60,7 @@ def test_a_speed_that_the_robot_cannot_take_is_refused(axis, bad, sentence):
         ("Already in SDK mode", Answer(True, None)),
         ("fail seq 7", Answer(False, 7)),
         ("error", Answer(False, None)),
-        ("not in sdk mode", Answer(False, None)),
+        ("not in sdk mode seq 8", Answer(False, 8, is_outside=True)),
         ("quit sdk mode failed", Answer(False, None)),
         ("command format error: command parse error seq 12", Answer(False, 12)),
         ("command format error: no seq value", Answer(False, None)),

@@ -212,6 +212,18 @@ def test_a_robot_that_another_link_holds_is_a_link_that_is_down():
         assert rig.plant.velocity_body == STOP
 
 
+def test_a_robot_that_has_left_sdk_mode_is_a_link_that_is_down_until_it_is_opened_again(line):
+    transport, far = line
+    transport.open()
+    far.send(b"not in sdk mode seq 3;")
+    transport.service(0.0)
+    assert transport.refusals == 1
+    with pytest.raises(MtmError, match="has left SDK mode"):
+        transport.send(FORWARD)
+    transport.open()
+    transport.send(FORWARD)
+
+
 def test_a_robot_that_closes_the_line_is_a_link_that_is_down(line):
     transport, far = line
     transport.open()
