@@ -22,7 +22,7 @@ from mtm_onboard.transports.mavlink_messages import (
 from mtm_onboard.transports.mavlink_ports import Port, port_opener
 from mtm_onboard.transports.mavlink_profiles import profile_named
 from mtm_onboard.transports.mavlink_signing import load_signing_key, signing_timestamp
-from mtm_onboard.transports.mavlink_vehicle import VehicleState
+from mtm_onboard.transports.mavlink_state import VehicleState
 
 HEARTBEAT_PERIOD_S: Final = 1.0
 # Vehicles say once a second in which mode they are; after three missed ones nobody knows who flies.
@@ -82,7 +82,6 @@ class MavlinkTransport(Transport):
         self._vehicle = VehicleState(self._profile, target_system)
         self._port: Port | None = None
         self._is_engaged = False
-        self._is_taken_over = False
         self._writing, self._reading = threading.Lock(), threading.Lock()
         self._first_beat_s: float | None = None
         self._last_beat = -1
@@ -97,7 +96,7 @@ class MavlinkTransport(Transport):
         """Who is in charge, what the vehicle said, and what went wrong on the link."""
         vehicle, codec = self._vehicle, self._codec
         return {
-            "engaged": self._is_engaged, "taken_over": self._is_taken_over,
+            "engaged": self._is_engaged and not vehicle.was_taken, "taken_over": vehicle.was_taken,
             "mode": vehicle.mode, "armed": vehicle.is_armed,
             "heartbeats_sent": self.heartbeats, "heartbeats_heard": vehicle.heartbeats, "setpoints": self.setpoints,
             "refusals": vehicle.refusals, "last_refusal": vehicle.last_refusal,
@@ -110,7 +109,7 @@ class MavlinkTransport(Transport):
         """Open the wire and wait until the vehicle obeys set-points; it then stands still.
 
         Raises MtmError, with the wire closed, when the wire cannot be had, when no vehicle of the profile's kind is
-        heard, and when it does not get into its mode or armed in time.
+        heard, and when it does not get into its mode or armed in time; TakenOverError when it does and leaves again.
         """
         self._open(self._set_mode, self._arm)
 
@@ -124,7 +123,7 @@ class MavlinkTransport(Transport):
     def _open(self, set_mode: bool, arm: bool) -> None:
         self._may_set_mode, self._may_arm = set_mode, arm
         with self._writing:
-            self._is_engaged = self._is_taken_over = False
+            self._is_engaged = False
             if self._port is None:
                 self._port = self._open_port()
                 self._first_beat_s = None
@@ -156,7 +155,7 @@ class MavlinkTransport(Transport):
         Afterwards `send` refuses until `open`. Raises MtmError when it could not be sent once.
         """
         self._is_engaged = False
-        if self._port is None or self._vehicle.heard_s is None or self._is_taken_over:
+        if self._port is None or self._vehicle.heard_s is None or self._vehicle.was_taken:
             return
         sent, failure = 0, None
         for number in range(_STOPS):
@@ -202,6 +201,7 @@ class MavlinkTransport(Transport):
         while True:
             now_s = clock.now()
             self.service(now_s)
+            self._require_pilots_consent()
             lack = self._lack()
             if lack is None:
                 return
@@ -231,17 +231,7 @@ class MavlinkTransport(Transport):
                 f"The vehicle says it is autopilot {vehicle.autopilot} and type {vehicle.vehicle_type}, which is no "
                 f"{profile.name}; choose the profile that fits it."
             )
-        if not vehicle.is_in_mode:
-            way = self._why_not() if self._may_set_mode else "switch it over, or allow that with set_mode = true"
-            return f"The vehicle is not in {profile.mode} (its mode is {vehicle.mode}); {way}."
-        if not vehicle.is_armed:
-            way = self._why_not() if self._may_arm else "arm it, or allow that with arm = true"
-            return f"The vehicle is not armed; {way}."
-        return None
-
-    def _why_not(self) -> str:
-        said = "; ".join(text for text in (self._vehicle.last_refusal, self._vehicle.last_alarm) if text)
-        return f"look at what it says ({said or 'nothing so far'})"
+        return vehicle.lack(self._may_set_mode, self._may_arm)
 
     def _ask(self, attempt: int) -> None:
         messages = self._codec.messages
@@ -253,17 +243,20 @@ class MavlinkTransport(Transport):
 
     def _require_command(self, now_s: float) -> None:
         """Raise MtmError unless the link is open, and the vehicle was heard lately and has not been taken over."""
-        vehicle = self._vehicle
-        if self._is_taken_over:
-            raise TakenOverError(
-                f"The vehicle left {self._profile.mode} or was disarmed (its mode is {vehicle.mode}), so somebody has "
-                "taken it over; nothing more is sent until the link is opened anew."
-            )
-        if not self._is_engaged:
+        self._require_pilots_consent()
+        heard_s = self._vehicle.heard_s
+        if not self._is_engaged or heard_s is None:
             raise MtmError("The link to the vehicle is not open, or was stopped; open it before sending.")
-        silent_s = math.inf if vehicle.heard_s is None else now_s - vehicle.heard_s
+        silent_s = now_s - heard_s
         if silent_s > HEARTBEAT_LOST_S:
             raise MtmError(f"The vehicle was last heard {silent_s:.1f} s ago; check the link to it.")
+
+    def _require_pilots_consent(self) -> None:
+        if self._vehicle.was_taken:
+            raise TakenOverError(
+                f"The vehicle left {self._profile.mode} or was disarmed (its mode is {self._vehicle.mode}), so "
+                "somebody has taken it over; nothing more is sent until the link is opened anew."
+            )
 
     def _setpoint(self, velocity: BodyVelocity) -> Any:
         return velocity_setpoint(self._codec.messages, self._profile, self._target, velocity, self._clock.now())
@@ -295,16 +288,10 @@ class MavlinkTransport(Transport):
                 for message in self._codec.decode(data):
                     if self._vehicle.take(message, now_s):
                         port.keep_sender()
-                        self._notice_takeover()
         except MtmError:
             self.link_errors += self._port is not None
         finally:
             self._reading.release()
-
-    def _notice_takeover(self) -> None:
-        if self._is_engaged and not (self._vehicle.is_in_mode and self._vehicle.is_armed):
-            self._is_taken_over = True
-            self._is_engaged = False
 
 
 def _check_options(

@@ -189,6 +189,31 @@ def test_a_pilot_who_takes_over_is_never_fought(profile, way):
     assert rig.plant.velocity_body == STOP
 
 
+@pytest.mark.parametrize("way", ["switches", "disarms"])
+def test_a_pilot_is_not_fought_while_opening_either(way):
+    """The vehicle was armed or in its mode, and lacks the other, when the pilot acts."""
+    rig = mavlink_rig(
+        set_mode=True, arm=True, vehicle={"is_guided": False, "is_armed": way == "disarms", "can_arm": False}
+    )
+    if way == "disarms":
+        rig.vehicle._codec.decode = lambda _: []  # it hears no request, and stays out of its mode
+
+    def act(_now_s):
+        if way == "disarms":
+            rig.vehicle.pilot_disarms()
+        else:
+            rig.vehicle.pilot_switches(rig.vehicle.firmware.other_mode)
+
+    rig.clock.every(100.0, act, first_s=3.0)
+    asked = []
+    rig.clock.every(100.0, lambda _: asked.extend(rig.vehicle.requests), first_s=4.01)
+    with pytest.raises(TakenOverError, match="somebody has taken it over"):
+        rig.transport.open()
+    rig.run(5.0)
+    assert rig.vehicle.requests == asked
+    assert not rig.vehicle.is_obeying
+
+
 def test_after_a_takeover_only_opening_anew_drives_again():
     rig = mavlink_rig()
     with rig.transport:
@@ -267,6 +292,12 @@ def test_telemetry_is_that_of_the_plant(profile):
         assert told.turn_rate_radps == 0.5
         assert told.heading_rad == pytest.approx(rig.plant.heading_rad, abs=0.06)
         assert told.position_xy_m == pytest.approx(rig.plant.position_xy_m, abs=0.07)
+
+
+def test_the_first_heartbeat_of_a_vehicle_that_was_never_ready_is_no_takeover():
+    rig = mavlink_rig(set_mode=True, arm=True, vehicle={"is_guided": False, "is_armed": False})
+    with rig.transport:
+        assert rig.transport.health()["taken_over"] is False
 
 
 def test_alarms_are_counted_and_mere_information_is_not():

@@ -21,9 +21,10 @@ _REQUESTS: Final = {DO_SET_MODE: "the mode", ARM_DISARM: "arming"}
 class VehicleState:
     """The autopilot of one system, read by `profile`.
 
-    `mode` is the custom mode of its newest heartbeat and `heard_s` when that came, None before the first. `refusals`
-    counts requests that it answered with anything but yes, `alarms` its texts of severity warning or worse, of which
-    `last_alarm` is the newest, and `malformed` telemetry that is not finite.
+    `mode` is the custom mode of its newest heartbeat and `heard_s` when that came, None before the first. `was_taken`
+    is set when it has left the profile's mode, or was disarmed, after it was seen otherwise. `refusals` counts requests
+    that it answered with anything but yes, `alarms` its texts of severity warning or worse, of which `last_alarm` is
+    the newest, and `malformed` telemetry that is not finite.
     """
 
     def __init__(self, profile: Profile, system_id: int) -> None:
@@ -33,9 +34,11 @@ class VehicleState:
         self.heard_s: float | None = None
         self.autopilot = self.vehicle_type = self.mode = -1
         self.is_armed = False
+        self.was_taken = False
         self.telemetry: VehicleTelemetry | None = None
         self._profile = profile
         self._system_id = system_id
+        self._was_in_mode = self._was_armed = False
         self._attitude: Any = None
 
     @property
@@ -51,6 +54,23 @@ class VehicleState:
     def forget(self) -> None:
         """Let only heartbeats from now on count."""
         self.heard_s = None
+        self.was_taken = self._was_in_mode = self._was_armed = False
+
+    def lack(self, may_set_mode: bool, may_arm: bool) -> str | None:
+        """What keeps the vehicle that was heard from obeying, in one sentence, and what to do about it."""
+        profile = self._profile
+        said = "; ".join(text for text in (self.last_refusal, self.last_alarm) if text) or "nothing so far"
+        if not self.is_in_mode:
+            way = (
+                f"look at what it says ({said})"
+                if may_set_mode
+                else "switch it over, or allow that with set_mode = true"
+            )
+            return f"The vehicle is not in {profile.mode} (its mode is {self.mode}); {way}."
+        if not self.is_armed:
+            way = f"look at what it says ({said})" if may_arm else "arm it, or allow that with arm = true"
+            return f"The vehicle is not armed; {way}."
+        return None
 
     def take(self, message: Any, now_s: float) -> bool:
         """Read one message; True for a heartbeat of this vehicle's autopilot."""
@@ -62,6 +82,9 @@ class VehicleState:
             self.heard_s = now_s
             self.autopilot, self.vehicle_type = message.autopilot, message.type
             self.mode, self.is_armed = message.custom_mode, bool(message.base_mode & ARMED_FLAG)
+            if (self._was_in_mode and not self.is_in_mode) or (self._was_armed and not self.is_armed):
+                self.was_taken = True
+            self._was_in_mode, self._was_armed = self.is_in_mode, self.is_armed
             return True
         if kind == "ATTITUDE":
             self._attitude = message
