@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from hil.onboard_process import check_ticks
-from hil.realtime import run_realtime
+from hil.realtime import _aligned, _content, run_realtime
+from hil.rig import RunSettings
 from mtm_onboard.journal import JournalHeader, JournalRecord, read_journal
 from mtm_onboard.protocol import MtmError, save_key
+from mtm_onboard.protocol.framing import Framing
 from tests.hil.fleet import fake_key, short_run
 
 
@@ -36,6 +38,35 @@ def test_missed_ticks_are_counted():
 def test_a_journal_that_shows_a_failed_run_is_refused(record, sentence):
     with pytest.raises(MtmError, match=sentence):
         check_ticks("robot0", record)
+
+
+def framed_run(framing: Framing, payload, schedule="fixed") -> RunSettings:
+    key = fake_key(300)
+    key = replace(key, scheme=replace(key.scheme, framing=framing, schedule=schedule))
+    return short_run(key=key, symbols=None, payload=payload)
+
+
+@pytest.mark.parametrize(
+    ("settings", "arguments"),
+    [
+        (short_run(), ["--symbols", "0,1,2,3"]),
+        (short_run(symbols=None), ["--no-message"]),
+        (framed_run(Framing("integer", 8), 77), ["--message=77"]),
+        (framed_run(Framing("text", 8), "-"), ["--text=-"]),
+        (framed_run(Framing("bytes", 8), b"\x0f"), ["--hex", "0f"]),
+    ],
+)
+def test_the_programs_are_told_the_message_as_their_command_line_takes_it(settings, arguments):
+    assert _content(settings) == arguments
+
+
+def test_a_rolling_run_in_real_time_is_later_by_what_remains_until_a_slot_begins():
+    settings = framed_run(Framing("integer", 8), 77, "rolling")
+    aligned, start_unix_s = _aligned(settings, 1_800_000_001.5)
+    assert start_unix_s == 1_800_000_006.0
+    assert (aligned.start_s, aligned.seconds) == (settings.start_s + 4.5, settings.seconds + 4.5)
+    fixed = short_run()
+    assert _aligned(fixed, 1_800_000_001.5) == (fixed, 1_800_000_001.5)
 
 
 @pytest.mark.realtime
