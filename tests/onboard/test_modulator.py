@@ -2,6 +2,8 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from mtm_onboard.message import PlainMessage
 from mtm_onboard.modulator import Modulator
@@ -152,6 +154,29 @@ def test_a_stall_across_the_boundary_of_a_change_shifts_nothing(schedule):
     played(modulator, [60])
     other = played(Modulator(book, "b", (1, 1, 3)), range(400))
     assert np.array_equal(played(modulator, range(170, 400)), other[170:])
+
+
+@given(
+    st.sampled_from(["fixed", "rolling"]),
+    st.integers(-200, 10),
+    st.lists(st.tuples(st.integers(1, 90), st.none() | st.integers(0, 3)), max_size=40),
+)
+def test_whatever_is_queued_and_missed_each_tick_has_its_own_message_s_noise(schedule, tick, steps):
+    book = small_codebook(schedule=schedule)
+    channel = book.scheme.channel("a")
+    modulator = Modulator(book, "a", (0,))
+    starts = {0: 0}
+    for step, symbol in steps:
+        tick += step
+        if symbol is not None:
+            modulator.queue((symbol,))
+        message = max(0, tick // 120)
+        symbol_now = starts[max(start for start in starts if start <= message)]
+        expected = book.samples(channel, message, [symbol_now])[0, :, tick % 120] if tick >= 0 else np.zeros(2)
+        assert np.array_equal(modulator.perturbation(tick), expected)
+        modulator.prepare(tick)
+        if symbol is not None:
+            starts[max(0, tick // 120 + 1)] = symbol
 
 
 def test_the_last_of_several_queued_before_a_boundary_is_played_and_each_hears_the_same_start():
