@@ -12,6 +12,8 @@ from mtm_audit.tracks import Floats
 
 # Message lengths that are tried: many allocations divide them into whole windows.
 _ROUND_TICKS = 60
+# The next length tried is at least so much longer: a finer search would gain less than rounding costs.
+_STEP = 1.005
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class SplitByCapacity:
         logs = [curve.log_accuracies for curve in self.curves]
         candidates = split_lengths(self.curves, self.symbols)
         if not self.curves[0].measured_only:
-            candidates = candidates[candidates % _ROUND_TICKS == 0]
+            candidates = _thinned(candidates[candidates % _ROUND_TICKS == 0])
         for length in candidates:
             allocation = self._allocation(int(length), logs)
             best = -np.inf if allocation is None else _total(logs, allocation, int(length))
@@ -68,6 +70,15 @@ class SplitByCapacity:
             if number and count - own[number - 1] <= spare:
                 gains[place] = _log_of(log, own[number - 1], message_ticks) - _log_of(log, count, message_ticks)
         return max(gains, key=gains.__getitem__) if gains else None
+
+
+def _thinned(lengths: Integers) -> Integers:
+    """Ascending lengths without those that are hardly longer than the one kept before."""
+    kept: list[int] = []
+    for length in lengths.tolist():
+        if not kept or length >= _STEP * kept[-1]:
+            kept.append(length)
+    return np.array(kept, dtype=np.int64)
 
 
 def _nearest_accuracy(curve: Curve, log: Floats, window_ticks: int) -> float:

@@ -10,7 +10,7 @@ from mtm_audit.planning.family import Strategy
 from mtm_audit.planning.interval import message_interval
 from mtm_onboard.protocol.errors import MtmError
 
-LONGEST_PAYLOAD_BITS = 4096
+LONGEST_PAYLOAD_BITS = 1024
 
 
 @dataclass(frozen=True)

@@ -105,8 +105,8 @@ def test_what_cannot_be_is_refused_with_what_can():
         search(LANDER, Problem(10, 0.9999, (4,), measured_only=True))
     with pytest.raises(MtmError, match="the table has no M = 16; choose of 2, 4, 8"):
         search(LANDER, Problem(10, 0.9, (4, 16)))
-    with pytest.raises(MtmError, match="1 to 4096, so send a longer payload in several messages"):
-        Problem(4097, 0.9)
+    with pytest.raises(MtmError, match="1 to 1024, so send a longer payload in several messages"):
+        Problem(1025, 0.9)
     for target in (0.0, 1.0, 1.5, float("nan")):
         with pytest.raises(MtmError, match="choose one above 0 and below 1"):
             Problem(10, target)
