@@ -2,6 +2,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from hil.clock import SimulatedClock
 from hil.robots.can_node import CanMotionController
@@ -314,6 +316,43 @@ def test_health_is_the_wrapper_s_and_the_link_s(bench):
         bench.service_error, bench.is_absent = OSError("no heartbeat"), True
         bench.clock.sleep_until(0.5)
         assert link.health() == {"link_up": False, "link_losses": 1, "dropped": 0}
+
+
+phases = st.lists(
+    st.tuples(st.sampled_from(["sound", "failing", "absent", "busy", "unserved"]), st.booleans(), st.integers(1, 30)),
+    min_size=1, max_size=12,
+)  # fmt: skip
+
+
+@given(phases)
+def test_whatever_the_link_goes_through_the_robot_moves_only_for_a_young_command_from_after_its_return(phases):
+    """Phases of so many ticks each, with or without base commands: what reached the robot, against when it may move."""
+    bench = Bench()
+    link = bench.reconnecting()
+    link.open()
+    driven = Driven(link, bench.clock, Modulator(small_codebook(), "a", (2,)))
+    last_command_s, up_since_s = -math.inf, -math.inf
+    for state, is_commanded, ticks in phases:
+        bench.error = {"failing": OSError("pulled"), "absent": OSError("pulled"), "busy": LinkBusyError("full")}.get(
+            state
+        )
+        bench.service_error = OSError("no heartbeat") if state == "unserved" else None
+        bench.is_absent = state == "absent"
+        for _ in range(ticks):
+            before = len(bench.commands)
+            now_s = bench.clock.now()
+            driven.run(0.02, BASE if is_commanded else None)
+            if is_commanded:
+                last_command_s = now_s
+            reached = bench.commands[before:]
+            assert len(reached) <= 1
+            for velocity in reached:
+                if velocity != STOP:
+                    assert now_s - last_command_s < 0.25
+                    assert last_command_s > up_since_s
+            up_since_s = math.inf if link.up_since_s is None else link.up_since_s
+    assert driven.guard.unsent == link.dropped
+    assert driven.stats.sent == sum(ticks for _, _, ticks in phases)
 
 
 class Adapter:
