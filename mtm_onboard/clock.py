@@ -1,5 +1,8 @@
 """Time, as the loop sees it: the system's monotonic clock on the robot, simulated time in the rig."""
 
+import ctypes
+import errno
+import math
 import time
 from typing import Protocol
 
@@ -18,6 +21,13 @@ class Clock(Protocol):
 
 # Linux stops CLOCK_MONOTONIC while the host is suspended, and a base command from before would be young after it.
 _CLOCK = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
+_TIMER_ABSTIME = 1
+# None where the C library has no such call.
+_CLOCK_NANOSLEEP = getattr(ctypes.CDLL(None), "clock_nanosleep", None)
+
+
+class _Timespec(ctypes.Structure):
+    _fields_ = (("seconds", ctypes.c_long), ("nanoseconds", ctypes.c_long))
 
 
 class SystemClock:
@@ -28,7 +38,15 @@ class SystemClock:
         return time.clock_gettime(_CLOCK)
 
     def sleep_until(self, deadline_s: float) -> None:
-        """Sleep for what remains; signals do not end it early."""
-        remaining_s = deadline_s - self.now()
-        if remaining_s > 0:
-            time.sleep(remaining_s)
+        """Wait for the instant itself; signals do not end it early.
+
+        `time.sleep` waits for what remains, and a thread that loses its processor after reckoning that, before it
+        sleeps, would wake so much later.
+        """
+        instant = _Timespec(*divmod(math.ceil(deadline_s * 1e9), 10**9))
+        while (remaining_s := deadline_s - self.now()) > 0:
+            if _CLOCK_NANOSLEEP is None or _CLOCK_NANOSLEEP(
+                _CLOCK, _TIMER_ABSTIME, ctypes.byref(instant), None
+            ) not in (0, errno.EINTR):
+                # Some other system's, or one that knows no such wait on this clock.
+                time.sleep(remaining_s)

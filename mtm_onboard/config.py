@@ -11,8 +11,8 @@ from mtm_onboard.guard import Limits, Staleness
 from mtm_onboard.protocol.errors import MtmError
 
 Option = str | int | float | bool
-_SECTIONS = ("robot", "transport", "link", "limits", "stale", "source", "journal", "control")
-_OPTIONAL_SECTIONS = ("link", "stale", "journal", "control")
+_SECTIONS = ("robot", "transport", "link", "limits", "stale", "source", "journal", "control", "realtime")
+_OPTIONAL_SECTIONS = ("link", "stale", "journal", "control", "realtime")
 _SOURCE_KINDS = ("udp", "stdin")
 _T = TypeVar("_T")
 
@@ -76,6 +76,24 @@ class ControlSettings:
 
 
 @dataclass(frozen=True)
+class RealtimeSettings:
+    """What the loop asks of the system: a `priority` under SCHED_FIFO, its memory locked, the processor `cpu` alone.
+
+    None and False leave things as they are. Raises MtmError for a priority or processor that no system has.
+    """
+
+    priority: int | None = None
+    lock_memory: bool = False
+    cpu: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.priority is not None and not 1 <= self.priority <= 99:
+            raise MtmError(f"priority is {self.priority}; choose 1 to 99, or leave it out")
+        if self.cpu is not None and not 0 <= self.cpu < 1024:
+            raise MtmError(f"cpu is {self.cpu}; choose the number of a processor, from 0 on, or leave it out")
+
+
+@dataclass(frozen=True)
 class RobotConfig:
     """All of it. `transport_options` are the fields of [transport] beside its kind.
 
@@ -91,6 +109,7 @@ class RobotConfig:
     journal: JournalSettings | None
     link: LinkSettings = LinkSettings()
     control: ControlSettings | None = None
+    realtime: RealtimeSettings = RealtimeSettings()
 
 
 def load_config(path: Path) -> RobotConfig:
@@ -130,6 +149,7 @@ def config_from_table(table: dict[str, Any]) -> RobotConfig:
         journal=_section(JournalSettings, "journal", table["journal"]) if "journal" in table else None,
         control=_section(ControlSettings, "control", table["control"]) if "control" in table else None,
         link=_section(LinkSettings, "link", table.get("link", {})),
+        realtime=_section(RealtimeSettings, "realtime", table.get("realtime", {})),
     )
 
 

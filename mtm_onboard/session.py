@@ -2,6 +2,7 @@
 
 import gc
 import math
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -19,8 +20,10 @@ from mtm_onboard.message import Content, message_of
 from mtm_onboard.modulator import Modulator
 from mtm_onboard.protocol import Key, MtmError, Scheme
 from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
+from mtm_onboard.realtime import realtime
 from mtm_onboard.runtime import Runtime
 from mtm_onboard.service import ServiceThread
+from mtm_onboard.servicemanager import ServiceManager
 from mtm_onboard.source import Source, StdinSource, UdpSource
 from mtm_onboard.transports.base import Transport
 from mtm_onboard.transports.factory import make_transport
@@ -116,14 +119,25 @@ def run_session(config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callabl
             )  # fmt: skip
             socket.serve(Control(session).answer)
 
-        def ending() -> bool:
-            return asked_to_end() or service.error is not None or clock.now() >= start_s + plan.duration_s
+        # Closed first of all: whoever ends takes as long as it takes, and no watchdog is fed any more.
+        manager = ServiceManager()
+        stack.callback(manager.close)
 
-        with _long_lived_objects_uncollected():
+        def ending() -> bool:
+            now_s = clock.now()
+            manager.feed(now_s)
+            return asked_to_end() or service.error is not None or now_s >= start_s + plan.duration_s
+
+        with _long_lived_objects_uncollected(), realtime(config.realtime, _warn):
+            manager.ready()
             run_loop(clock, rate_hz, runtime.step, start_s=start_s, stop=ending, stats=stats)
         if service.error is not None:
             raise MtmError(f"the robot's link failed ({service.error}); check the link") from service.error
     return Outcome(stats, guard, source, journal, runtime.transport_errors)
+
+
+def _warn(text: str) -> None:
+    print(f"mtm-onboard: {text}", file=sys.stderr)
 
 
 def _link(config: RobotConfig, clock: Clock) -> Transport:

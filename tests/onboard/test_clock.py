@@ -1,3 +1,4 @@
+import signal
 import sys
 import time
 
@@ -25,3 +26,34 @@ def test_a_step_of_the_system_s_time_does_not_touch_the_clock(monkeypatch):
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no CLOCK_BOOTTIME")
 def test_the_sleep_of_a_suspended_host_counts():
     assert SystemClock().now() == pytest.approx(time.clock_gettime(time.CLOCK_BOOTTIME), abs=1.0)
+
+
+def test_a_signal_is_handled_at_once_and_does_not_end_a_wait_early():
+    clock = SystemClock()
+    deadline_s = clock.now() + 0.05
+    handled_s = []
+    former = signal.signal(signal.SIGALRM, lambda *_: handled_s.append(clock.now()))
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.005)
+        clock.sleep_until(deadline_s)
+    finally:
+        signal.signal(signal.SIGALRM, former)
+    assert clock.now() >= deadline_s
+    assert len(handled_s) == 1
+
+
+def test_a_host_without_an_absolute_wait_waits_for_what_remains(monkeypatch):
+    clock = SystemClock()
+    for call in (None, lambda *_: 22):
+        monkeypatch.setattr("mtm_onboard.clock._CLOCK_NANOSLEEP", call)
+        deadline_s = clock.now() + 0.005
+        clock.sleep_until(deadline_s)
+        assert clock.now() >= deadline_s
+
+
+def test_the_wait_is_for_the_instant_and_not_for_a_span(monkeypatch):
+    monkeypatch.setattr(time, "sleep", lambda _: pytest.fail("waited for a span"))
+    clock = SystemClock()
+    deadline_s = clock.now() + 0.005
+    clock.sleep_until(deadline_s)
+    assert clock.now() >= deadline_s

@@ -1,11 +1,12 @@
 import math
+import socket
 import threading
 from dataclasses import replace
 from itertools import count
 
 import pytest
 
-from mtm_onboard.config import LinkSettings, RobotConfig, config_from_table
+from mtm_onboard.config import LinkSettings, RealtimeSettings, RobotConfig, config_from_table
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol import Channel, Key, MtmError
 from mtm_onboard.session import Plan, run_session
@@ -169,3 +170,70 @@ def test_the_robot_is_told_to_stop_before_a_wedged_thread_is_waited_for(config, 
     link = use(Wedged())
     run_session(config, KEY, Plan(None, duration_s=0.0), never)
     assert link.events == ["open", "stop", "stop", "close"]
+
+
+def test_the_service_manager_hears_of_the_loop_from_the_loop_itself(config, use, tmp_path, monkeypatch):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(tmp_path / "notify"))
+        manager.setblocking(False)
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        # A millisecond, so that every tick is due to feed.
+        monkeypatch.setenv("WATCHDOG_USEC", "1000")
+        opened = []
+
+        class Opening(Link):
+            def open(self) -> None:
+                super().open()
+                opened.append(heard(manager))
+
+            def stop(self) -> None:
+                super().stop()
+                words.extend(heard(manager))
+
+        words: list[bytes] = []
+        link = use(Opening())
+        sent = run_session(config, KEY, Plan(None, duration_s=0.1), never).stats.sent
+    # Nothing before the link was up, and all of it by the time the robot is told to stop.
+    assert opened == [[]]
+    assert words == [b"READY=1\n", *[b"WATCHDOG=1\n"] * (sent + 1), b"STOPPING=1\n"]
+    assert link.sent == sent
+
+
+def test_a_loop_that_hangs_is_not_said_to_be_alive(config, use, tmp_path, monkeypatch):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(tmp_path / "notify"))
+        manager.setblocking(False)
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        monkeypatch.setenv("WATCHDOG_USEC", "1000")
+
+        class Hanging(Link):
+            def send(self, velocity: BodyVelocity) -> None:
+                heard(manager)
+                # Many watchdog periods, in which the service's thread goes on.
+                threading.Event().wait(0.05)
+                words.extend(heard(manager))
+                super().send(velocity)
+
+        words: list[bytes] = []
+        use(Hanging("send", failing_from=1))
+        with pytest.raises(MtmError):
+            run_session(config, KEY, Plan(None), never)
+    assert words == []
+
+
+def heard(manager: socket.socket) -> list[bytes]:
+    words = []
+    while True:
+        try:
+            words.append(manager.recv(100))
+        except BlockingIOError:
+            return words
+
+
+def test_what_the_system_refuses_of_real_time_is_told_and_the_run_goes_on(config, use, capsys):
+    link = use(Link())
+    config = replace(config, realtime=RealtimeSettings(cpu=1023))
+    run_session(config, KEY, Plan(None, duration_s=0.0), never)
+    assert link.sent > 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("mtm-onboard: [realtime]")
