@@ -8,9 +8,11 @@ from mtm_audit.planning.search import curves_of
 from mtm_audit.planning.table import AccuracyTable, members_of, pooled_name
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.framing import payload_bits
-from mtm_onboard.protocol.scheme import Scheme
+from mtm_onboard.protocol.scheme import Scheme, count_bins
 
 _MOST_REPEATS = 10_000
+# With fewer, two candidates of a fixed schedule are often alike, and stay so in every repeat.
+_FEW_TONES = 5
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,8 @@ class Duration:
     """How much motion to record. `repeats`: whole messages; `accuracy` and `interval` are those of all of them pooled.
 
     `from_start_s` suffices when the recording begins with a message; `anywhere_s` holds whole repeats of every window
-    wherever in a message it begins.
+    wherever in a message it begins. `tones`: those of the shortest window where repeats play the same waveform again
+    (fixed schedule), else 0.
     """
 
     repeats: int
@@ -26,6 +29,12 @@ class Duration:
     anywhere_s: float
     accuracy: float
     interval: tuple[float, float]
+    tones: int
+
+    @property
+    def repeats_gain_less(self) -> bool:
+        """Whether the prediction is too high: the same few tones come again in every repeat."""
+        return self.repeats > 1 and 0 < self.tones < _FEW_TONES
 
 
 def required_duration(scheme: Scheme, table: AccuracyTable, bits: int, target_accuracy: float) -> Duration:
@@ -54,10 +63,21 @@ def required_duration(scheme: Scheme, table: AccuracyTable, bits: int, target_ac
         if plan.accuracy >= target_accuracy:
             longest = max(scheme.window_ticks(channel) for channel in scheme.channels)
             return Duration(
-                repeats, ticks / scheme.rate_hz, (ticks + longest) / scheme.rate_hz, plan.accuracy, plan.interval
+                repeats,
+                ticks / scheme.rate_hz,
+                (ticks + longest) / scheme.rate_hz,
+                plan.accuracy,
+                plan.interval,
+                _repeated_tones(scheme),
             )
         best = plan if best is None or plan.accuracy > best.accuracy else best
     raise MtmError(_too_short(scheme, parts, best, target_accuracy))
+
+
+def _repeated_tones(scheme: Scheme) -> int:
+    if scheme.schedule != "fixed":
+        return 0
+    return min(count_bins(scheme.window_ticks(channel), scheme.rate_hz, scheme.band_hz) for channel in scheme.channels)
 
 
 def _parts(scheme: Scheme, table: AccuracyTable) -> tuple[tuple[Curve, int], ...]:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 
 from mtm_audit.planning.duration import required_duration
@@ -30,6 +32,16 @@ def test_repeats_count_as_one_longer_window():
     assert found.from_start_s == 24.0
     assert found.anywhere_s == 26.0
     assert found.accuracy == pytest.approx(0.99**3)
+
+
+def test_repeats_of_few_tones_are_said_to_gain_less():
+    short, rights = table(30, 60, 95, step=30), 0.9
+    fixed = required_duration(scheme(1, ticks=30), short, 2, rights)
+    assert (fixed.repeats, fixed.tones, fixed.repeats_gain_less) == (3, 3, True)
+    rolling = replace(scheme(1, ticks=30), schedule="rolling")
+    assert not required_duration(rolling, short, 2, rights).repeats_gain_less
+    assert not required_duration(scheme(1, ticks=90), short, 2, rights).repeats_gain_less
+    assert not required_duration(scheme(1), table(50, 80, 95, 95, 95, 99), 2, 0.96).repeats_gain_less
 
 
 def test_every_channel_of_a_split_message_counts():
