@@ -22,6 +22,8 @@ def run_duration(key_path: Path, table_path: Path, bits: int | None, target_accu
         f"predicted accuracy {found.accuracy:.3f} [{low:.3f}-{high:.3f}] of {wanted} bits; "
         f"{wanted / found.from_start_s:.3g} bits/s"
     )
+    if found.beyond:
+        print("windows or their repeats are longer than any measured; they count as the longest measured ones")
     if found.repeats_gain_less:
         print(
             f"the shortest window has {found.tones} tones, the same in every repeat of a fixed schedule, so repeats "

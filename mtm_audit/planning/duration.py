@@ -1,16 +1,17 @@
 """How long a recording must be for a key's scheme to be read with a wanted accuracy."""
 
+import itertools
+import math
 from dataclasses import dataclass
 
 from mtm_audit.planning.curve import Curve
-from mtm_audit.planning.plan import Plan
+from mtm_audit.planning.interval import message_interval
 from mtm_audit.planning.search import curves_of
 from mtm_audit.planning.table import AccuracyTable, members_of, pooled_name
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.framing import payload_bits
 from mtm_onboard.protocol.scheme import Scheme, count_bins
 
-_MOST_REPEATS = 10_000
 # With fewer, two candidates of a fixed schedule are often alike, and stay so in every repeat.
 _FEW_TONES = 5
 
@@ -20,7 +21,8 @@ class Duration:
     """How much motion to record. `repeats`: whole messages; `accuracy` and `interval` are those of all of them pooled.
 
     `from_start_s` suffices when the recording begins with a message; `anywhere_s` holds whole repeats of every window
-    wherever in a message it begins. `tones`: those of the shortest window where repeats play the same waveform again
+    wherever in a message it begins. `beyond`: windows are longer than any measured, and the accuracy is that of the
+    longest measured. `tones`: those of the shortest window where repeats play the same waveform again
     (fixed schedule), else 0.
     """
 
@@ -29,6 +31,7 @@ class Duration:
     anywhere_s: float
     accuracy: float
     interval: tuple[float, float]
+    beyond: bool
     tones: int
 
     @property
@@ -40,10 +43,10 @@ class Duration:
 def required_duration(scheme: Scheme, table: AccuracyTable, bits: int, target_accuracy: float) -> Duration:
     """The shortest recording that has the target accuracy.
 
-    r repeats of a window of t ticks count as one window of r t ticks, since detectors add up what repeats say; so the
-    table must reach r t, and nothing is extrapolated. Error correction of the scheme's framing is not counted.
-    Raises MtmError when the payload does not fit the key's scheme, when the table lacks its channels or alphabet, or
-    when the longest windows of the table do not suffice.
+    r repeats of a window of t ticks count as one window of r t ticks, since detectors add up what repeats say;
+    longer windows than the table has are taken to be as accurate as its longest. Error correction of the scheme's
+    framing is not counted. Raises MtmError when the payload does not fit the key's scheme, when the table lacks its
+    channels or alphabet, or when the longest windows of the table do not suffice.
     """
     if not 0.0 < target_accuracy < 1.0:
         raise MtmError(f"the target accuracy is {target_accuracy:g}; choose one above 0 and below 1")
@@ -51,27 +54,27 @@ def required_duration(scheme: Scheme, table: AccuracyTable, bits: int, target_ac
     if not 1 <= bits <= holds:
         raise MtmError(f"a payload of {bits} bits does not fit: a message of this key carries 1 to {holds} bits")
     parts = _parts(scheme, table)
-    best: Plan | None = None
-    for repeats in range(1, _MOST_REPEATS):
+    longest = max(scheme.window_ticks(channel) for channel in scheme.channels)
+    for repeats in itertools.count(1):
         ticks = repeats * scheme.message_ticks
         windows = [ticks // count for _, count in parts]
-        if any(window > int(curve.window_ticks[-1]) for (curve, _), window in zip(parts, windows, strict=True)):
-            break
-        if any(not curve.exists_at(window) for (curve, _), window in zip(parts, windows, strict=True)):
+        ends = [int(curve.window_ticks[-1]) for curve, _ in parts]
+        known = [(curve, min(window, end), n) for (curve, n), window, end in zip(parts, windows, ends, strict=True)]
+        if any(window < int(curve.window_ticks[0]) for curve, window, _ in known):
             continue
-        plan = Plan("split", scheme.alphabet_size, ticks, parts, exact=True)
-        if plan.accuracy >= target_accuracy:
-            longest = max(scheme.window_ticks(channel) for channel in scheme.channels)
+        accuracy = math.prod(curve.accuracy(window) ** count for curve, window, count in known)
+        if accuracy >= target_accuracy:
             return Duration(
-                repeats,
-                ticks / scheme.rate_hz,
-                (ticks + longest) / scheme.rate_hz,
-                plan.accuracy,
-                plan.interval,
+                repeats, ticks / scheme.rate_hz, (ticks + longest) / scheme.rate_hz, accuracy,
+                message_interval(known), any(window > end for window, end in zip(windows, ends, strict=True)),
                 _repeated_tones(scheme),
-            )
-        best = plan if best is None or plan.accuracy > best.accuracy else best
-    raise MtmError(_too_short(scheme, parts, best, target_accuracy))
+            )  # fmt: skip
+        if all(window >= end for window, end in zip(windows, ends, strict=True)):
+            break
+    raise MtmError(
+        f"the longest windows of the table give an accuracy of {accuracy:.3g}, not {target_accuracy:g}; lower the "
+        "target, or measure longer windows"
+    )
 
 
 def _repeated_tones(scheme: Scheme) -> int:
@@ -98,17 +101,3 @@ def _parts(scheme: Scheme, table: AccuracyTable) -> tuple[tuple[Curve, int], ...
                 f"has {known} at M = {', '.join(map(str, table.alphabet_sizes))})"
             )
     return tuple((curves[frozenset(members_of(name))], count) for name, count in wanted)
-
-
-def _too_short(scheme: Scheme, parts: tuple[tuple[Curve, int], ...], best: Plan | None, target: float) -> str:
-    if best is None:
-        curve, count = parts[0]
-        return (
-            f"the table has windows of {curve.window_ticks[0]} to {curve.window_ticks[-1]} ticks for {curve.channel}, "
-            f"and no number of repeats of this key's {scheme.message_ticks // count} lies within that for every "
-            f"channel; measure {scheme.message_ticks // count} and multiples of it"
-        )
-    return (
-        f"the longest windows of the table give {best.accuracy:.3g} with {best.message_ticks // scheme.message_ticks} "
-        f"repeats, not {target:g}; lower the target, or measure longer windows"
-    )

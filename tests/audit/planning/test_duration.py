@@ -64,7 +64,7 @@ def test_channels_that_carry_the_same_need_their_pooled_row():
         (3, 0.9, "a payload of 3 bits does not fit: a message of this key carries 1 to 2 bits"),
         (0, 0.9, "does not fit"),
         (2, 1.0, "choose one above 0 and below 1"),
-        (2, 0.99, "give 0.95 with 3 repeats, not 0.99; lower the target, or measure longer windows"),
+        (2, 0.99, "the table give an accuracy of 0.95, not 0.99; lower the target, or measure longer windows"),
     ],
 )
 def test_what_cannot_be_is_refused_with_what_can(bits, target, says):
@@ -72,8 +72,12 @@ def test_what_cannot_be_is_refused_with_what_can(bits, target, says):
         required_duration(scheme(1, ticks=100), table(50, 80, 95), bits, target)
 
 
-def test_windows_outside_the_table_are_not_guessed():
-    with pytest.raises(MtmError, match="has windows of 100 to 300 ticks for x, .* measure 400 and multiples of it"):
-        required_duration(scheme(1, ticks=400), table(50, 80, 95), 2, 0.5)
+def test_longer_windows_than_any_measured_count_as_the_longest_and_that_is_said():
+    found = required_duration(scheme(1, ticks=400), table(50, 80, 95), 2, 0.5)
+    assert (found.repeats, found.accuracy, found.beyond) == (1, 0.95, True)
+    assert not required_duration(scheme(1, ticks=300), table(50, 80, 95), 2, 0.5).beyond
+
+
+def test_windows_shorter_than_any_measured_are_not_guessed():
     # One window of 50 ticks lies below the table, two of them do not.
     assert required_duration(scheme(1, ticks=50), table(50, 80, 95), 2, 0.4).repeats == 2
