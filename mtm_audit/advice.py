@@ -18,6 +18,8 @@ def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
             "Either nobody sent one, or it was sent with another key, or the recording is too short or too coarse to "
             "show it.",
         )
+    if decoding.scheme.framing is not None:
+        return (_of_the_frame(decoding),)
     if not decoding.uncertain and not decoding.order_known:
         return (
             "The message repeats, and nothing shows which of its symbols comes first; give --onset when it is known "
@@ -30,6 +32,14 @@ def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
             f"{(1 << payload_bits(decoding.scheme)) - 1}; the robot was perhaps given symbols instead of a number.",
         )
     return tuple(_of_the_uncertain(recording, decoding))
+
+
+def _of_the_frame(decoding: Decoding) -> str:
+    unseen = sum(symbol is None for symbol in decoding.symbols)
+    doubtful = len(decoding.uncertain) - unseen
+    seen = f"{unseen} of {len(decoding.symbols)} symbols were not seen and {doubtful} are less than {CERTAIN:.0%} sure"
+    when = " Check --at as well: a frame's check holds in its own day alone." if decoding.settings.at else ""
+    return f"What was read is no frame of this key whose check holds: {seen}; record more repetitions of it.{when}"
 
 
 def _of_the_uncertain(recording: Recording, decoding: Decoding) -> list[str]:

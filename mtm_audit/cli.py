@@ -73,19 +73,28 @@ def decode(
     profile: Annotated[
         Path | None, typer.Option(metavar="FILE", help="What mtm-audit profile learnt about this type of robot.")
     ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", help="When the recording began (2026-01-31T12:00:00Z), for a rolling schedule."),
+    ] = None,
+    at_error: Annotated[
+        float, typer.Option(min=0.0, max=60.0, metavar="SECONDS", help="How far that time may be off.")
+    ] = 30.0,
 ) -> None:
     """Decode the message in a recording.
 
     Exit codes: 0 decoded, 3 no message of this key, 4 inconclusive, 1 error, 2 usage, 130 interrupted.
     """  # fmt: skip
-    onset_s, pairs = _onset_s(onset), _pairs(assign or [])
+    onset_s, pairs, at_unix_s = _onset_s(onset), _pairs(assign or []), _unix_s(at)
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.decode import DecodeOptions, run_decode
         from mtm_audit.decode import DecodeSettings
         from mtm_audit.detectors.matched.profile import load_profile
+        from mtm_audit.when import RecordedAt
 
         known = None if profile is None else load_profile(profile)
-        settings = DecodeSettings(detector, onset_s, decoys, threshold, pairs, known)
+        recorded = None if at_unix_s is None else RecordedAt(at_unix_s, at_error)
+        settings = DecodeSettings(detector, onset_s, decoys, threshold, pairs, known, recorded)
         code = run_decode(DecodeOptions(tuple(paths), key, tracker, settings, as_json, plot, explain))
     raise typer.Exit(code)
 
@@ -212,6 +221,20 @@ def _onset_s(text: str) -> float | None:
     if not math.isfinite(onset_s):
         raise typer.BadParameter(f"{text!r} is neither a number of seconds nor auto", param_hint="--onset")
     return onset_s
+
+
+def _unix_s(text: str | None) -> float | None:
+    if text is None:
+        return None
+    from datetime import UTC, datetime
+
+    try:
+        when = datetime.fromisoformat(text)
+    except ValueError:
+        raise typer.BadParameter(
+            f"{text!r} is no date and time; write it like 2026-01-31T12:00:00Z", param_hint="--at"
+        ) from None
+    return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()
 
 
 def _pairs(texts: Sequence[str]) -> dict[str, str]:

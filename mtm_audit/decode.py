@@ -1,7 +1,7 @@
-"""From tracks to a verdict: assignment, readings under the key and its decoys, symbols, message."""
+"""From tracks to a verdict: assignment, readings under the key and its decoys, symbols or frames, message."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -9,12 +9,14 @@ from mtm_audit.assignment import assign_tracks
 from mtm_audit.detectors import make_detector
 from mtm_audit.detectors.base import Reading
 from mtm_audit.detectors.matched.profile import PlantProfile
+from mtm_audit.frames import Delivered, Heard, decode_frames
 from mtm_audit.glimpse import Glimpse
 from mtm_audit.order import order_is_known
 from mtm_audit.readings import Progress, Readings, read_tracks
 from mtm_audit.tracks import Floats, Track
 from mtm_audit.verdict import Evidence, VerdictName
-from mtm_onboard.protocol.framing import number_of_symbols
+from mtm_audit.when import RecordedAt, Start, start_of
+from mtm_onboard.protocol.framing import Payload, number_of_symbols
 from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.scheme import Channel, Scheme
 
@@ -26,7 +28,8 @@ CERTAIN = 0.95
 class DecodeSettings:
     """How to decode: `onset_s` None searches for the message's start; `assignment` maps bodies to track names.
 
-    `profile` is what is known of the robots' plant beforehand; the detector must take one.
+    `profile` is what is known of the robots' plant beforehand; the detector must take one. `at` is when the recording
+    was made, which a rolling schedule needs.
     """
 
     detector: str = "coherency"
@@ -35,6 +38,7 @@ class DecodeSettings:
     threshold: float = 1e-4
     assignment: Mapping[str, str] = field(default_factory=dict)
     profile: PlantProfile | None = None
+    at: RecordedAt | None = None
 
 
 @dataclass(frozen=True)
@@ -65,17 +69,21 @@ class Decoding:
     """The answer, and all it rests on.
 
     `symbols` has one entry a message position (None where nothing shows it), `posteriors` (L, M) the probabilities
-    behind them. `message` is the number they spell, given only with the verdict "decoded". `order_known` is False when
-    the message repeats and nothing shows which of its symbols comes first.
+    behind them; those of a framed message are in frame order, and before the code has corrected any. `message` is the
+    number they spell, or the frame's payload, given only with the verdict "decoded". `order_known` is False when the
+    message repeats and nothing shows which of its symbols comes first. `frames` are the framed messages found, in the
+    order in which they were sent, `message` being the last; a single one that does not hold is the best guess.
     """
 
     verdict: VerdictName
-    message: int | None
+    message: Payload | None
     symbols: tuple[int | None, ...]
     posteriors: Floats
     order_known: bool
     evidence: Evidence
     channels: tuple[ChannelDecoding, ...]
+    start: Start
+    frames: tuple[Delivered, ...]
     key_id: str
     scheme: Scheme
     settings: DecodeSettings
@@ -104,38 +112,69 @@ def decode_tracks(
     """
     detector = make_detector(settings.detector, settings.profile)
     assignment = assign_tracks(key.scheme, tracks, settings.assignment)
-    readings = read_tracks(assignment, key, detector, settings.decoys, settings.onset_s, progress)
+    start = start_of(key.scheme, tracks, settings.onset_s, settings.at)
+    readings = read_tracks(assignment, key, detector, settings.decoys, start, progress)
     channels = tuple(_channel_decoding(channel, readings, key.scheme) for channel in key.scheme.channels)
-    posteriors, symbols = _message_symbols(key.scheme, channels)
-    return _decoding(key, settings, channels, symbols, posteriors, readings.evidence)
-
-
-def _decoding(
-    key: Key,
-    settings: DecodeSettings,
-    channels: tuple[ChannelDecoding, ...],
-    symbols: tuple[int | None, ...],
-    posteriors: Floats,
-    evidence: Evidence,
-) -> Decoding:
     order_known = settings.onset_s is not None or all(
         order_is_known(decoding.reading, decoding.channel, key.scheme.schedule)
         for decoding in channels
         if decoding.reading is not None
     )
-
-    def answer(verdict: VerdictName, message: int | None) -> Decoding:
-        return Decoding(
-            verdict, message, symbols, posteriors, order_known, evidence, channels, key.id, key.scheme, settings
+    frames: tuple[Delivered, ...] = ()
+    posteriors, symbols = _message_symbols(key.scheme, channels)
+    present = readings.evidence.p_value <= settings.threshold
+    # A frame read from a recording without a message would be chance, and a check of few bits would let some pass.
+    if key.scheme.framing is not None and present:
+        frames = decode_frames(
+            _heard(readings, key.scheme), key.scheme, key.secret, start.first_slot, order_known=order_known
         )
+        posteriors, symbols = _frame_symbols(frames[-1])
+    undecided = Decoding(
+        "inconclusive" if present else "absent",
+        None,
+        symbols,
+        posteriors,
+        order_known,
+        readings.evidence,
+        channels,
+        start,
+        frames,
+        key.id,
+        key.scheme,
+        settings,
+    )
+    message = _message_of(undecided) if present else None
+    return undecided if message is None else replace(undecided, verdict="decoded", message=message)
 
-    if evidence.p_value > settings.threshold:
-        return answer("absent", None)
-    undecided = answer("inconclusive", None)
-    if undecided.uncertain or not order_known:
-        return undecided
-    message = number_of_symbols([symbol for symbol in symbols if symbol is not None], key.scheme)
-    return undecided if message is None else answer("decoded", message)
+
+def _message_of(decoding: Decoding) -> Payload | None:
+    """What a present message says; None when that is uncertain."""
+    framing = decoding.scheme.framing
+    if framing is not None:
+        read = decoding.frames[-1].message
+        # Without a check the order of the symbols and the likeliest codeword are all there is.
+        sure = read.check_passed or (framing.check == "none" and decoding.order_known and read.posterior >= CERTAIN)
+        return read.payload if sure else None
+    if decoding.uncertain or not decoding.order_known:
+        return None
+    return number_of_symbols([symbol for symbol in decoding.symbols if symbol is not None], decoding.scheme)
+
+
+def _heard(readings: Readings, scheme: Scheme) -> list[Heard]:
+    return [
+        Heard(channel, readings.channels[channel.name])
+        for channel in scheme.channels
+        if channel.name in readings.channels
+    ]
+
+
+def _frame_symbols(frame: Delivered) -> tuple[Floats, tuple[int | None, ...]]:
+    """Posteriors (L, M) and decisions of a frame's symbols, each by itself."""
+    ratios = frame.ratios
+    weights = np.exp(ratios - ratios.max(axis=1, keepdims=True))
+    seen = np.ptp(ratios, axis=1) > 0.0
+    symbols = tuple(int(best) if known else None for best, known in zip(np.argmax(ratios, axis=1), seen, strict=True))
+    return weights / weights.sum(axis=1, keepdims=True), symbols
 
 
 def _channel_decoding(channel: Channel, readings: Readings, scheme: Scheme) -> ChannelDecoding:

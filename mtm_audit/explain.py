@@ -7,6 +7,7 @@ import numpy as np
 
 from mtm_audit.assignment import assign_tracks
 from mtm_audit.decode import CERTAIN, ChannelDecoding, DecodeSettings, Decoding
+from mtm_audit.delivery import frame_sentences
 from mtm_audit.readings import usable_glimpses
 from mtm_audit.recordings.recording import Recording
 from mtm_audit.report import chance_sentence, evidence_sentence, percent, recording_line, verdict_sentence
@@ -73,7 +74,7 @@ def stages_of_decoding(decoding: Decoding) -> list[Stage]:
     """Glimpse to verdict; the stage that kept the message from being read is marked as failed."""
     weak = decoding.verdict == "absent"
     unclear = decoding.verdict == "inconclusive"
-    unreadable = unclear and not decoding.uncertain
+    unreadable = unclear and (not decoding.uncertain or decoding.scheme.framing is not None)
     stages = [
         Stage("glimpse", tuple(_glimpse_line(channel) for channel in decoding.channels)),
         Stage("timing", tuple(_timing_line(channel, decoding) for channel in decoding.channels)),
@@ -148,9 +149,11 @@ def _symbol_lines(decoding: Decoding) -> tuple[str, ...]:
 
 
 def _message_line(decoding: Decoding) -> str:
+    if decoding.scheme.framing is not None:
+        return "; ".join(frame_sentences(decoding)) or "the symbols are no frame of this key whose check holds"
     bits = payload_bits(decoding.scheme)
     if decoding.message is not None:
-        return f"the symbols spell {decoding.message}, one of 0 to {(1 << bits) - 1} ({bits} bits)"
+        return f"the symbols spell {decoding.message!r}, one of 0 to {(1 << bits) - 1} ({bits} bits)"
     if decoding.uncertain:
         return "not put together, since symbols are uncertain"
     if not decoding.order_known:

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from mtm_audit.decode import CERTAIN, ChannelDecoding, Decoding
+from mtm_audit.frames import Delivered
 from mtm_audit.recordings.recording import Recording
 from mtm_audit.report import message_bits
+from mtm_onboard.protocol.slots import slot_start_unix_s
 
 SCHEMA_VERSION = 1
 
@@ -20,8 +22,9 @@ def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, .
         "schema_version": SCHEMA_VERSION,
         "program": {"name": "mtm-audit", "version": version("mtm")},
         "verdict": decoding.verdict,
-        "message": decoding.message,
+        "message": decoding.message.hex() if isinstance(decoding.message, bytes) else decoding.message,
         "message_bits": message_bits(decoding),
+        "frames": [_frame(frame, decoding) for frame in decoding.frames if frame.message.payload is not None],
         "symbols": _symbols(decoding),
         "p_value": evidence.p_value,
         "threshold": decoding.settings.threshold,
@@ -45,6 +48,27 @@ def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, .
         "warnings": list(warnings),
     }
     return json.dumps(report, indent=2, allow_nan=False) + "\n"
+
+
+def _frame(frame: Delivered, decoding: Decoding) -> dict[str, Any]:
+    """One framed message; bytes are written as hexadecimal digits."""
+    message, framing = frame.message, decoding.scheme.framing
+    rolling = decoding.scheme.schedule == "rolling"
+    return {
+        "payload_kind": None if framing is None else framing.payload,
+        "payload": message.payload.hex() if isinstance(message.payload, bytes) else message.payload,
+        "number": message.number,
+        "check": message.check,
+        "check_bits": message.check_bits,
+        "check_passed": message.check_passed,
+        "authenticated": message.authenticated,
+        "false_acceptance": message.false_acceptance,
+        "posterior": message.posterior,
+        "epoch": message.epoch,
+        "slot_start_unix_s": slot_start_unix_s(frame.slots[0], decoding.scheme) if rolling else None,
+        "start_s": frame.start_s,
+        "end_s": frame.end_s,
+    }
 
 
 def _symbols(decoding: Decoding) -> list[dict[str, Any]]:

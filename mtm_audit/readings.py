@@ -12,6 +12,7 @@ from mtm_audit.glimpse import Glimpse, glimpse_of_track
 from mtm_audit.pairing import Pairing, all_strengths, search_pairs
 from mtm_audit.tracks import Track
 from mtm_audit.verdict import Evidence, decoy_codebooks
+from mtm_audit.when import Start
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.scheme import Scheme
@@ -42,7 +43,7 @@ def read_tracks(
     key: Key,
     detector: Detector,
     decoys: int,
-    onset_s: float | None,
+    start: Start,
     progress: Progress | None = None,
 ) -> Readings:
     """Read each body's track, after a search for those bodies whose track nothing settles.
@@ -51,11 +52,11 @@ def read_tracks(
     search alone: reading together depends on what the key chose, and would favour it over its decoys. Raises MtmError
     when no channel can be read.
     """
-    codebook, others = key.codebook(), decoy_codebooks(key, decoys)
+    codebook, others = key.codebook(start.first_slot), decoy_codebooks(key, decoys, start.first_slot)
 
     def read(observations: Sequence[Observation], stage: str | None) -> list[ChannelReading | MtmError]:
         report = None if progress is None or stage is None else partial(progress, stage)
-        return detector.read(codebook, others, observations, onset_s, report)
+        return detector.read(codebook, others, observations, start.onset, report)
 
     scheme = key.scheme
     settled = {body: glimpse_to_search(track, scheme.rate_hz) for body, track in assignment.settled.items()}

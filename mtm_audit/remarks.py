@@ -31,7 +31,7 @@ def _of_the_recording(recording: Recording, decoding: Decoding) -> list[str]:
             f"{rate_hz:.1f} observations a second are too few for a band up to {scheme.band_hz[1]:g} Hz; record with "
             f"at least {needed_hz:g}"
         )
-    if decoding.verdict != "absent" and not decoding.order_known:
+    if decoding.verdict != "absent" and not decoding.order_known and decoding.message is None:
         found.append("the message repeats, and nothing shows which of its symbols comes first; give --onset")
     return found
 

@@ -9,6 +9,7 @@ from rich.text import Text
 
 from mtm_audit.advice import advice
 from mtm_audit.decode import CERTAIN, ChannelDecoding, Decoding
+from mtm_audit.delivery import clock_sentence, frame_sentences, payload_text
 from mtm_audit.recordings.recording import Recording
 from mtm_onboard.protocol.framing import payload_bits
 
@@ -23,15 +24,19 @@ def print_report(console: Console, recording: Recording, decoding: Decoding, war
 def verdict_sentence(decoding: Decoding) -> str:
     """The verdict in one line."""
     if decoding.verdict == "decoded" and decoding.message is not None:
-        return f"decoded: message {decoding.message} ({message_bits(decoding)})"
+        bits = message_bits(decoding)
+        return f"decoded: {payload_text(decoding.message)}" + (f" ({bits})" if bits else "")
     if decoding.verdict == "absent":
         return f"absent: no message of key {decoding.key_id} was found in this recording"
     return "inconclusive: a message of this key is there, but not all of it could be read"
 
 
 def message_bits(decoding: Decoding) -> str | None:
-    """The message as a binary number with all its digits, `0b...`; None unless decoded."""
-    return None if decoding.message is None else f"0b{decoding.message:0{payload_bits(decoding.scheme)}b}"
+    """The message as a binary number with all its digits, `0b...`; None unless decoded, and a number."""
+    framing, message = decoding.scheme.framing, decoding.message
+    if not isinstance(message, int):
+        return None
+    return f"0b{message:0{framing.payload_bits if framing else payload_bits(decoding.scheme)}b}"
 
 
 def chance_sentence(decoding: Decoding) -> str:
@@ -81,7 +86,12 @@ def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str]) -
         Text(chance_sentence(decoding)),
         *(
             Text(sentence)
-            for sentence in (search_sentence(recording, decoding), *advice(recording, decoding))
+            for sentence in (
+                *frame_sentences(decoding),
+                clock_sentence(decoding),
+                search_sentence(recording, decoding),
+                *advice(recording, decoding),
+            )
             if sentence
         ),
         Text(""),
@@ -90,7 +100,7 @@ def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str]) -
         Text(f"recording  {recording_line(recording)}"),
         Text(f"evidence   {evidence_sentence(decoding)}"),
         Text(""),
-        _absent_table(decoding) if decoding.verdict == "absent" else _symbol_table(decoding),
+        _table_of(decoding),
     ]
     parts += [Text(f"warning: {warning}", style="yellow") for warning in warnings]
     return Group(*parts)
@@ -103,6 +113,35 @@ def recording_line(recording: Recording) -> str:
     what = "frames" if recording.kind == "video" else "samples"
     names = ", ".join(track.name for track in recording.tracks)
     return f"{recording.kind}, {recording.duration_s:.1f} s, {recording.frames} {what}{rate}, tracks: {names}"
+
+
+def _table_of(decoding: Decoding) -> Table:
+    if decoding.verdict == "absent":
+        return _absent_table(decoding)
+    return _symbol_table(decoding) if decoding.scheme.framing is None else _frame_table(decoding)
+
+
+def _frame_table(decoding: Decoding) -> Table:
+    """Channels with their windows; a frame's symbols may be dealt over all of them."""
+    table = _table("channel", "track", "start s", "rate Hz", "windows", "margin")
+    for channel in decoding.channels:
+        reading, head = channel.reading, [channel.channel.name, _track_name(channel)]
+        if reading is None:
+            table.add_row(*head, "-", "-", "0", "-")
+            continue
+        ranked = np.sort(reading.window_scores, axis=1)
+        margin = float(np.median(ranked[:, -1] - ranked[:, -2]))
+        starts = [f"{channel.onset_s:.2f}", f"{reading.timing.rate_hz:.2f}"]
+        table.add_row(*head, *starts, str(len(ranked)), _score(margin))
+    sure = sum(symbol is not None for symbol in decoding.symbols) - len(_doubtful(decoding))
+    seen = sum(symbol is not None for symbol in decoding.symbols)
+    table.add_section()
+    table.add_row("frame", f"{sure} of {len(decoding.symbols)} symbols sure, {len(decoding.symbols) - seen} not seen")
+    return table
+
+
+def _doubtful(decoding: Decoding) -> list[int]:
+    return [place for place in decoding.uncertain if decoding.symbols[place] is not None]
 
 
 def _symbol_table(decoding: Decoding) -> Table:

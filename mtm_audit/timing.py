@@ -22,6 +22,18 @@ class Timing:
 
 
 @dataclass(frozen=True)
+class OnsetRange:
+    """The first window began within these instants of the recording's clock, which may lie before its start."""
+
+    low_s: float
+    high_s: float
+
+
+# When the first window began: known, known within bounds, or anywhere in the recording.
+Onset = float | OnsetRange | None
+
+
+@dataclass(frozen=True)
 class PhatPlan:
     """What the onset search needs of a glimpse, whatever the candidate waveforms are.
 
@@ -73,6 +85,29 @@ def find_onset(plan: PhatPlan, references: list[Floats], positions: int, window_
     rate, lag = np.unravel_index(np.argmax(total), total.shape)
     rate_hz = float(plan.rates_hz[rate])
     return Timing(plan.first_s + float(lag) / rate_hz, rate_hz)
+
+
+def find_onset_within(plan: PhatPlan, references: list[Floats], bounds: OnsetRange, window_ticks: int) -> Timing:
+    """The onset within bounds, and the rate, at which the GCC-PHAT peaks of all numbered windows add up highest.
+
+    `references`: arrays (M, axes, window_ticks) of window 0, 1, ... from the onset on; those that lie wholly inside
+    the recording count, each by how far its best candidate stands above the usual.
+    """
+    first = np.floor((bounds.low_s - plan.first_s) * plan.rates_hz).astype(np.int64)
+    count = int(np.ceil((bounds.high_s - bounds.low_s) * plan.rates_hz.max())) + 1
+    onsets = first[:, None] + np.arange(count)
+    rows = np.arange(len(plan.rates_hz))[:, None]
+    total = np.zeros(onsets.shape, dtype=np.float32)
+    for window, reference in enumerate(references):
+        lags = onsets + window * window_ticks
+        inside = (lags >= 0) & (lags <= (plan.ticks - window_ticks)[:, None])
+        if inside.any():
+            peaks = _best_candidate(plan, reference)
+            excess = peaks - np.median(peaks, axis=1, keepdims=True)
+            total += np.where(inside, excess[rows, np.clip(lags, 0, plan.transform_ticks - 1)], np.float32(0.0))
+    rate, place = np.unravel_index(np.argmax(total), total.shape)
+    rate_hz = float(plan.rates_hz[rate])
+    return Timing(plan.first_s + float(onsets[rate, place]) / rate_hz, rate_hz)
 
 
 def _best_candidate(plan: PhatPlan, reference: Floats) -> NDArray[np.float32]:

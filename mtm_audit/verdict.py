@@ -45,9 +45,12 @@ class Evidence:
         return -math.log2(max(self.p_value, _LEAST_TAIL))
 
 
-def decoy_codebooks(key: Key, count: int) -> list[Codebook]:
+def decoy_codebooks(key: Key, count: int, first_slot: int = 0) -> list[Codebook]:
     """Codebooks of keys that nobody holds, derived from this key so that every decode of a file says the same."""
-    return [Codebook(stream(key.secret, "decoy", (number,), SECRET_BYTES), key.scheme) for number in range(count)]
+    return [
+        Codebook(stream(key.secret, "decoy", (number,), SECRET_BYTES), key.scheme, first_slot)
+        for number in range(count)
+    ]
 
 
 def weigh_log_evidence(strength: float, decoy_strengths: Floats) -> Evidence:

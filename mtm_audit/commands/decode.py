@@ -1,7 +1,7 @@
 """`mtm-audit decode`: from files to a verdict, and everything that a person or a program sees of it."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
@@ -96,7 +96,9 @@ def _read(recording: Recording, key: Key, settings: DecodeSettings, progress: Pr
     def show(stage: str, fraction: float) -> None:
         progress.update(task, description=stage, completed=fraction)
 
-    return decode_tracks(recording.tracks, key, settings, show)
+    # What a person says of the recording's time comes before what the file says.
+    timed = settings if settings.at is not None else replace(settings, at=recording.at)
+    return decode_tracks(recording.tracks, key, timed, show)
 
 
 def _publish(options: DecodeOptions, recording: Recording, decoding: Decoding) -> None:

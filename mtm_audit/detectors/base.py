@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mtm_audit.glimpse import Glimpse
-from mtm_audit.timing import Timing
+from mtm_audit.timing import Onset, Timing
 from mtm_audit.tracks import Floats
 from mtm_audit.verdict import Evidence
 from mtm_onboard.protocol.codebook import Codebook
@@ -21,8 +21,9 @@ class Reading:
     """One channel of one recording under one codebook.
 
     `scores` (positions, M): evidence for each symbol at each of the message's l_c positions, all repeats taken
-    together; `window_scores` (windows, M) the same for every window seen, `window_positions` (windows,) which
-    position each window carries, `window_starts_s` (windows,) when it began. `strength` is the single number that a
+    together; `window_scores` (windows, M) the same for every window seen, `window_numbers` (windows,) which window from
+    the onset on each is (negative ones came before it), `window_positions` (windows,) which position of the message it
+    carries, `window_starts_s` (windows,) when it began. `strength` is the single number that a
     verdict compares between the key and its decoys: larger means more evidence of any message at all. `maxima` is over
     how many independent maxima it is a mean or sum.
     """
@@ -30,6 +31,7 @@ class Reading:
     timing: Timing
     scores: Floats
     window_scores: Floats
+    window_numbers: NDArray[np.int64]
     window_positions: NDArray[np.int64]
     window_starts_s: Floats
     strength: float
@@ -46,22 +48,24 @@ class Observation:
 
 @dataclass(frozen=True)
 class ChannelReading:
-    """A channel's reading under the key, with what a verdict needs beside it.
+    """A channel's reading under the key, with what a message and a verdict need beside it.
 
     `posteriors` (positions, M): probability of each symbol at each position, given that a message is there;
+    `window_ratios` (windows, M): log-likelihood ratios in nats, the same for anything but the symbol;
     `decoy_strengths` (decoys,): the strength that the same search found under keys that nobody holds.
     """
 
     reading: Reading
     posteriors: Floats
+    window_ratios: Floats
     decoy_strengths: Floats
 
 
 class Detector(Protocol):
     """Scores the channels of a recording under a key's codebook and under those of its decoys.
 
-    All codebooks share one scheme. `onset_s` is when the message began, or None when that is searched for too;
-    everything that is searched is searched for each decoy anew.
+    All codebooks share one scheme. `onset` is when the codebooks' first window began, as far as it is known; everything
+    that is searched is searched for each decoy anew.
     """
 
     name: str
@@ -71,7 +75,7 @@ class Detector(Protocol):
         codebook: Codebook,
         decoys: Sequence[Codebook],
         observations: Sequence[Observation],
-        onset_s: float | None,
+        onset: Onset,
         progress: Callable[[float], None] | None = None,
     ) -> list[ChannelReading | MtmError]:
         """For each observation its reading, or why it cannot be read (too short for a window)."""

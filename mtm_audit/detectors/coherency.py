@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mtm_audit.detectors.base import ChannelReading, Observation, Reading, combine_repeats, whole_windows
 from mtm_audit.detectors.welch import Complexes, mean_coherency, segment_spectra
 from mtm_audit.glimpse import Glimpse, tick_velocities_at_rates
-from mtm_audit.timing import RATE_SCALES, Timing, find_onset, plan_onset_search
+from mtm_audit.timing import RATE_SCALES, Onset, OnsetRange, Timing, find_onset, find_onset_within, plan_onset_search
 from mtm_audit.tracks import Floats
 from mtm_audit.verdict import Evidence, weigh
 from mtm_onboard.protocol.codebook import Codebook
@@ -30,7 +30,7 @@ class CoherencyDetector:
         codebook: Codebook,
         decoys: Sequence[Codebook],
         observations: Sequence[Observation],
-        onset_s: float | None,
+        onset: Onset,
         progress: Callable[[float], None] | None = None,
     ) -> list[ChannelReading | MtmError]:
         """Read the channels one by one; each has its own timing. Raises MtmError without decoys."""
@@ -43,32 +43,41 @@ class CoherencyDetector:
             if progress is not None:
                 progress(number / len(observations))
             try:
-                own, *others = self.read_channel([codebook, *decoys], observation.channel, observation.glimpse, onset_s)
+                own, *others = self.read_channel([codebook, *decoys], observation.channel, observation.glimpse, onset)
             except MtmError as refusal:
                 results.append(refusal)
             else:
                 strengths = np.array([other.strength for other in others])
-                results.append(ChannelReading(own, self.posteriors(own, others), strengths))
+                ratios = self.window_ratios(own, others)
+                results.append(ChannelReading(own, self.posteriors(own, others), ratios, strengths))
         return results
 
     def read_channel(
-        self, codebooks: Sequence[Codebook], channel: Channel, glimpse: Glimpse, onset_s: float | None
+        self, codebooks: Sequence[Codebook], channel: Channel, glimpse: Glimpse, onset: Onset
     ) -> list[Reading]:
         """Score every window; without an onset, GCC-PHAT finds one for each codebook at each candidate rate."""
         scheme = codebooks[0].scheme
         ticks = scheme.window_ticks(channel)
         axes = _axes(channel, glimpse)
-        if onset_s is not None:
-            timing = Timing(onset_s, scheme.rate_hz)
+        if isinstance(onset, int | float):
+            timing = Timing(onset, scheme.rate_hz)
             return self._score_group(codebooks, [timing] * len(codebooks), channel, axes, searched=False)
         rates_hz = scheme.rate_hz * RATE_SCALES
         band = np.array(scheme.band_hz) / scheme.rate_hz
         plan = plan_onset_search(axes, rates_hz, band, ticks)
-        distinct = 1 if scheme.schedule == "fixed" else channel.symbols
-        timings = [
-            find_onset(plan, [codebook.samples(channel, n) for n in range(distinct)], channel.symbols, ticks)
-            for codebook in codebooks
-        ]
+        if isinstance(onset, OnsetRange):
+            # At the fastest rate the most windows fit between the earliest onset and the recording's end.
+            numbered = int(np.ceil((glimpse.edges_s[-1] - onset.low_s) * rates_hz[-1] / ticks))
+            timings = [
+                find_onset_within(plan, [codebook.samples(channel, n) for n in range(numbered)], onset, ticks)
+                for codebook in codebooks
+            ]
+        else:
+            distinct = 1 if scheme.schedule == "fixed" else channel.symbols
+            timings = [
+                find_onset(plan, [codebook.samples(channel, n) for n in range(distinct)], channel.symbols, ticks)
+                for codebook in codebooks
+            ]
         return self._score_group(codebooks, timings, channel, axes, searched=True)
 
     def posteriors(self, reading: Reading, decoys: Sequence[Reading]) -> Floats:
@@ -85,6 +94,13 @@ class CoherencyDetector:
         weights = np.exp(logs - logs.max(axis=1, keepdims=True))
         posteriors: Floats = weights / weights.sum(axis=1, keepdims=True)
         return posteriors
+
+    def window_ratios(self, reading: Reading, decoys: Sequence[Reading]) -> Floats:
+        """Log-likelihood ratios (windows, M) under the same law as `posteriors`, each window by itself."""
+        null = np.concatenate([decoy.window_scores.ravel() for decoy in decoys])
+        centre, variance = float(null.mean()), max(float(null.var()), 1e-12)
+        shift = max(0.0, float(np.mean(reading.window_scores.max(axis=1) - centre)))
+        return np.asarray(shift / variance * (reading.window_scores - centre))
 
     def weigh(self, strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:
         """Mean coherencies are means of maxima over many candidates and rates."""
@@ -141,16 +157,16 @@ def _read_at(
         observed = _observed_spectra(glimpse, codebooks[0], channel, timing.onset_s, int(window))
         for number, reference in enumerate(references):
             scores[number, row] = mean_coherency(reference, observed).max(axis=1)
-    positions = np.mod(windows, channel.symbols)
     starts_s = timing.onset_s + windows * ticks / timing.rate_hz
-    return [_reading(timing, scores[number], positions, starts_s, channel.symbols) for number in range(count)]
+    return [_reading(timing, scores[number], windows, starts_s, channel.symbols) for number in range(count)]
 
 
-def _reading(timing: Timing, scores: Floats, positions: NDArray[np.int64], starts_s: Floats, symbols: int) -> Reading:
+def _reading(timing: Timing, scores: Floats, numbers: NDArray[np.int64], starts_s: Floats, symbols: int) -> Reading:
+    positions = np.mod(numbers, symbols)
     combined = combine_repeats(scores, positions, symbols)
     seen = np.isin(np.arange(symbols), positions)
     strength = float(combined[seen].max(axis=1).mean())
-    return Reading(timing, combined, scores, positions, starts_s, strength, int(seen.sum()))
+    return Reading(timing, combined, scores, numbers, positions, starts_s, strength, int(seen.sum()))
 
 
 def _reference_spectra(codebooks: Sequence[Codebook], channel: Channel, window: int) -> list[Complexes]:

@@ -8,21 +8,29 @@ from typing import Literal
 import numpy as np
 
 from mtm_audit.recordings.load import is_video, load_tracks
+from mtm_audit.recordings.video import inspect_video
 from mtm_audit.tracks import Track
+from mtm_audit.when import RecordedAt
 from mtm_onboard.protocol.errors import MtmError
 
 Kind = Literal["video", "motion capture"]
+# Times from here on, the year 2001, count from the Unix epoch.
+_EARLIEST_UNIX_S = 1e9
 _MOTION_CAPTURE_SUFFIXES = frozenset({".csv", ".tum", ".txt"})
 
 
 @dataclass(frozen=True)
 class Recording:
-    """What was recorded: the files, their tracks, and one sentence for each thing that was wrong but usable."""
+    """What was recorded: the files, their tracks, and one sentence for each thing that was wrong but usable.
+
+    `at` is when the files say that they were recorded, None when they do not.
+    """
 
     paths: tuple[Path, ...]
     kind: Kind
     tracks: tuple[Track, ...]
     warnings: tuple[str, ...] = ()
+    at: RecordedAt | None = None
 
     @property
     def frames(self) -> int:
@@ -71,7 +79,16 @@ def read_recording(
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise MtmError(f"two files are of the body {twice!r}; leave one out or rename it")
-    return Recording(files, kind, tuple(tracks), tuple(warnings))
+    return Recording(files, kind, tuple(tracks), tuple(warnings), _recorded_at(files, kind, tracks))
+
+
+def _recorded_at(files: Sequence[Path], kind: Kind, tracks: Sequence[Track]) -> RecordedAt | None:
+    """A video's creation time; motion capture whose times are those since the Unix epoch says it by itself."""
+    if kind == "video":
+        created_s = inspect_video(files[0]).created_unix_s
+        return None if created_s is None else RecordedAt(created_s)
+    first_s = min((float(track.times_s[0]) for track in tracks if len(track.times_s)), default=0.0)
+    return RecordedAt(0.0) if first_s > _EARLIEST_UNIX_S else None
 
 
 def _folder_files(folder: Path) -> list[Path]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,24 +22,28 @@ if TYPE_CHECKING:
 PLANAR_LUMA = frozenset({"gray", "yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12"})
 
 
+_EARLIEST_UNIX_S = 1e9
+
+
 @dataclass(frozen=True)
 class VideoFile:
-    """What the file says of itself; `duration_s` and `frame_count` are None where it does not say."""
+    """What the file says of itself; what it does not say is None. `created_unix_s` is when it was recorded."""
 
     path: Path
     width_px: int
     height_px: int
     duration_s: float | None
     frame_count: int | None
+    created_unix_s: float | None
 
 
 def inspect_video(path: Path) -> VideoFile:
     """Read size, duration and frame count from the file's header; raises MtmError as `read_frames` does."""
-    with _opened(path) as (_, stream):
+    with _opened(path) as (container, stream):
         duration_s = None
         if stream.duration is not None and stream.time_base is not None:
             duration_s = float(stream.duration * stream.time_base)
-        return VideoFile(path, stream.width, stream.height, duration_s, stream.frames or None)
+        return VideoFile(path, stream.width, stream.height, duration_s, stream.frames or None, _created(container))
 
 
 def read_frames(path: Path, pixels: Pixels = "gray", warn: Callable[[str], None] | None = None) -> Iterator[Frame]:
@@ -77,6 +82,17 @@ def read_frames(path: Path, pixels: Pixels = "gray", warn: Callable[[str], None]
         say(f"{path} is damaged after {last_s:.3f} s ({damage}); only the {decoded} frames before that are used")
     if untimed:
         say(f"{untimed} frames of {path} have no time stamp that comes after the one before; they are left out")
+
+
+def _created(container: "InputContainer") -> float | None:
+    """Seconds since the Unix epoch of the metadata's creation time; None when it is missing or no time at all."""
+    try:
+        created = datetime.fromisoformat(container.metadata["creation_time"])
+    except (KeyError, ValueError):
+        return None
+    # Without a zone the container formats mean UTC. Cameras whose clock was never set say 1904 or 1970.
+    unix_s = (created if created.tzinfo else created.replace(tzinfo=UTC)).timestamp()
+    return unix_s if unix_s > _EARLIEST_UNIX_S else None
 
 
 @contextmanager

@@ -25,13 +25,15 @@ def key_of(scheme, secret=FAKE_SECRET):
     return Key("fake", secret, scheme)
 
 
-def robot_track(key, name, symbols, seconds, *, onset_s=0.0, rate_scale=1.0, seed=0, rate_hz=100.0):
-    """Motion capture of one robot that drives the zigzag from the start and sends `symbols` (None: nothing) from
-    `onset_s` on, again and again; a negative onset means it has sent for a while. `rate_scale` makes its clock fast.
-    """  # fmt: skip
+def robot_track(key, name, symbols, seconds, *, onset_s=0.0, rate_scale=1.0, seed=0, rate_hz=100.0, first_slot=0):
+    """Motion capture of one robot that drives the zigzag from the start and sends again and again from `onset_s` on.
+
+    `symbols` are its own, or a message of the runtime's, or None for nothing; a negative onset means it has sent for a
+    while. `rate_scale` makes its clock fast.
+    """
     scheme = key.scheme
     channel = scheme.channel(name)
-    modulator = None if symbols is None else Modulator(key.codebook(), name, symbols)
+    modulator = None if symbols is None else Modulator(key.codebook(first_slot), name, symbols)
     route = routes((0, 1, 2, 3))[seed % 4]
     plant, task = MecanumPlant(calibrated_parameters(), seed, route.start_xy_m), GoToGoal(route)
     period_s = 1.0 / (scheme.rate_hz * rate_scale)

@@ -84,8 +84,11 @@ def reader(strengths, refuse_together=False):
                 MtmError("too short")
                 if own is None
                 else ChannelReading(
-                    Reading(Timing(0.0, 50.0), scores, scores, np.zeros(1, int), np.zeros(1), own[0], 1),
+                    Reading(
+                        Timing(0.0, 50.0), scores, scores, np.zeros(1, int), np.zeros(1, int), np.zeros(1), own[0], 1
+                    ),
                     scores + 0.5,
+                    scores,
                     np.array(own[1:], dtype=float),
                 )
             )

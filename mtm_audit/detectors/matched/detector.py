@@ -16,7 +16,7 @@ from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_audit.detectors.matched.refine import refined_timing
 from mtm_audit.detectors.matched.search import Found, search_timings
 from mtm_audit.detectors.matched.windows import LEAST_PART, Window, make_windows
-from mtm_audit.timing import Timing
+from mtm_audit.timing import Onset, Timing
 from mtm_audit.tracks import Floats
 from mtm_audit.verdict import Evidence, weigh_log_evidence
 from mtm_onboard.protocol.codebook import Codebook
@@ -40,7 +40,7 @@ class MatchedDetector:
         codebook: Codebook,
         decoys: Sequence[Codebook],
         observations: Sequence[Observation],
-        onset_s: float | None,
+        onset: Onset,
         progress: Callable[[float], None] | None = None,
     ) -> list[ChannelReading | MtmError]:
         """Search each observation's timing under every codebook; then read all observations together under the key.
@@ -54,7 +54,7 @@ class MatchedDetector:
                 motions[number] = uniform_motion(observation.glimpse, codebook.scheme.band_hz[1])
             except MtmError as refusal:
                 refusals[number] = refusal
-        readings = self._read_together(codebook, decoys, observations, motions, onset_s, progress) if motions else {}
+        readings = self._read_together(codebook, decoys, observations, motions, onset, progress) if motions else {}
         return [readings[number] if number in readings else refusals[number] for number in range(len(observations))]
 
     def weigh(self, strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:
@@ -67,16 +67,16 @@ class MatchedDetector:
         decoys: Sequence[Codebook],
         observations: Sequence[Observation],
         motions: dict[int, Motion],
-        onset_s: float | None,
+        onset: Onset,
         progress: Callable[[float], None] | None,
     ) -> dict[int, ChannelReading]:
         channels = [observations[number].channel for number in motions]
         moved = list(motions.values())
         moved = _along_principal_axes(moved)
         noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
-        searched = _searched([codebook, *decoys], channels, moved, noise, onset_s, progress)
+        searched = _searched([codebook, *decoys], channels, moved, noise, onset, progress)
         timings = [found[0].timing for found in searched]
-        free = onset_s is None
+        free = onset is None
         windows = _all_windows(codebook, channels, moved, timings, searched=free)
         found = estimate(windows, moved, noise, self._profile)
         better = refined_timing(found, windows, moved, timings)
@@ -88,7 +88,9 @@ class MatchedDetector:
         for row, number in enumerate(motions):
             strengths = np.array([other.evidence for other in searched[row]])
             reading = _reading(codebook, channels[row], row, windows, found, timings[row], float(strengths[0]))
-            readings[number] = ChannelReading(reading, _posteriors(reading.scores), strengths[1:])
+            readings[number] = ChannelReading(
+                reading, _posteriors(reading.scores), reading.window_scores, strengths[1:]
+            )
         return readings
 
 
@@ -97,7 +99,7 @@ def _searched(
     channels: Sequence[Channel],
     motions: Sequence[Motion],
     noise: NoiseModel,
-    onset_s: float | None,
+    onset: Onset,
     progress: Callable[[float], None] | None,
 ) -> list[list[Found]]:
     """For each robot, for each codebook the timing; robots whose windows are of one length share what they found."""
@@ -105,13 +107,13 @@ def _searched(
     searched = []
     for row, (channel, robot) in enumerate(zip(channels, prepared, strict=True)):
         part = None if progress is None else _part_of(progress, row, len(channels))
-        searched.append(search_timings(codebooks, channel, robot, onset_s, part))
+        searched.append(search_timings(codebooks, channel, robot, onset, part))
     lengths = [codebooks[0].scheme.window_ticks(channel) for channel in channels]
     for length in dict.fromkeys(lengths):
         fleet = [row for row, other in enumerate(lengths) if other == length]
         if len(fleet) > 1:
             members = [Member(channels[row], prepared[row], searched[row]) for row in fleet]
-            for row, found in zip(fleet, share_timings(codebooks, members, onset_s), strict=True):
+            for row, found in zip(fleet, share_timings(codebooks, members, onset), strict=True):
                 searched[row] = found
     return searched
 
@@ -175,4 +177,4 @@ def _reading(
     scores = np.zeros((channel.symbols, codebook.scheme.alphabet_size))
     np.add.at(scores, positions, ratios)
     starts_s = timing.onset_s + numbers * (codebook.scheme.window_ticks(channel) / timing.rate_hz)
-    return Reading(timing, scores, ratios, positions, starts_s, strength, 1)
+    return Reading(timing, scores, ratios, numbers, positions, starts_s, strength, 1)

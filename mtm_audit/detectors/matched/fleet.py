@@ -16,7 +16,7 @@ from mtm_audit.detectors.matched.hypotheses import log_rate_prior
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.search import Found, candidate_rates, lead_cells, waveform_sets
 from mtm_audit.detectors.matched.windows import LEAST_PART
-from mtm_audit.timing import Timing
+from mtm_audit.timing import Onset, Timing
 from mtm_audit.tracks import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel, Scheme
@@ -47,22 +47,22 @@ class Member:
     searched: Sequence[Found]
 
 
-def share_timings(codebooks: Sequence[Codebook], fleet: Sequence[Member], onset_s: float | None) -> list[list[Found]]:
+def share_timings(codebooks: Sequence[Codebook], fleet: Sequence[Member], onset: Onset) -> list[list[Found]]:
     """For each robot, for each codebook the timing once the robots know of each other's; the evidence is the largest
     that the robot met. All channels have windows of one length.
     """
     offered = []
     for number, codebook in enumerate(codebooks):
         strongest = sorted((member.searched[number] for member in fleet), key=lambda found: -found.evidence)[:_OFFERS]
-        offered.append([_near(codebook, fleet, found.timing, onset_s) for found in strongest])
-    weighed = [_weigh(codebooks, member, offered, onset_s) for member in fleet]
+        offered.append([_near(codebook, fleet, found.timing, onset) for found in strongest])
+    weighed = [_weigh(codebooks, member, offered, onset) for member in fleet]
     result: list[list[Found]] = [[] for _ in fleet]
     for number, codebook in enumerate(codebooks):
         shared, best = _fleet_timing(codebook, offered[number], [evidence[number] for evidence in weighed])
         settled = _settled([member.searched[number] for member in fleet], shared)
         for row, (member, found) in enumerate(zip(fleet, settled, strict=True)):
             timing = found.timing
-            if onset_s is None and codebook.scheme.schedule == "fixed":
+            if onset is None and codebook.scheme.schedule == "fixed":
                 timing = _counted_from_first_message(timing, codebook.scheme, member)
             result[row].append(Found(timing, max(member.searched[number].evidence, best[row])))
     return result
@@ -76,7 +76,7 @@ def _counted_from_first_message(timing: Timing, scheme: Scheme, member: Member) 
     return replace(timing, onset_s=float(timing.onset_s + messages * member.channel.symbols * length_s))
 
 
-def _near(codebook: Codebook, fleet: Sequence[Member], timing: Timing, onset_s: float | None) -> _Near:
+def _near(codebook: Codebook, fleet: Sequence[Member], timing: Timing, onset: Onset) -> _Near:
     """Rates that move the ends of the recording by half a cell against its middle, and onsets in half cells."""
     scheme, channel = codebook.scheme, fleet[0].channel
     ticks = scheme.window_ticks(channel)
@@ -85,24 +85,24 @@ def _near(codebook: Codebook, fleet: Sequence[Member], timing: Timing, onset_s: 
     start_s = min(motion.start_s for motion in motions)
     end_s = max(motion.start_s + len(motion.seen) * motion.step_s for motion in motions)
     rates_hz = timing.rate_hz * (1.0 + _RATE_STEPS * step_s / (end_s - start_s))
-    if onset_s is None:
+    if not isinstance(onset, int | float):
         middle = np.rint(((start_s + end_s) / 2.0 - timing.onset_s) * timing.rate_hz / ticks)
         middle_s = timing.onset_s + middle * ticks / timing.rate_hz
         onsets_s = (middle_s - middle * ticks / rates_hz)[:, None] + _HALF_CELLS * step_s
     else:
-        onsets_s = np.full((len(rates_hz), 1), onset_s)
-    coarse = candidate_rates(scheme, channel)
+        onsets_s = np.full((len(rates_hz), 1), onset)
+    coarse = candidate_rates(scheme, channel, onset)
     coarse_hz = float(coarse[np.argmin(np.abs(coarse - timing.rate_hz))])
     return _Near(np.repeat(rates_hz, onsets_s.shape[1]), onsets_s.ravel(), coarse_hz)
 
 
 def _weigh(
-    codebooks: Sequence[Codebook], member: Member, offered: Sequence[Sequence[_Near]], onset_s: float | None
+    codebooks: Sequence[Codebook], member: Member, offered: Sequence[Sequence[_Near]], onset: Onset
 ) -> list[Floats]:
     """One robot's evidence without prior of what each codebook's fleet offers, (offers, timings) for each codebook."""
     scheme, channel, motion = codebooks[0].scheme, member.channel, member.prepared.motion
-    lead, windows = lead_cells(scheme, channel, motion), waveform_sets(scheme, channel, motion)
-    ticks, from_onset = scheme.window_ticks(channel), onset_s is not None
+    lead, windows = lead_cells(scheme, channel, motion, onset), waveform_sets(scheme, channel, motion, onset)
+    ticks, from_onset = scheme.window_ticks(channel), isinstance(onset, int | float)
     tones = [[stacked_tones(codebook, channel, number) for number in range(windows)] for codebook in codebooks]
     result: list[Floats] = [np.empty((len(nears), len(nears[0].rates_hz))) for nears in offered]
     for coarse_hz in sorted({near.coarse_hz for nears in offered for near in nears}):

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mtm_audit.detectors.matched.motion import Motion
+from mtm_audit.timing import Onset, OnsetRange
 from mtm_audit.tracks import Bools, Floats
 
 _DRIFT_S = 0.02
@@ -47,7 +48,7 @@ def make_grid(
     ticks: int,
     lead: int,
     numbered: int,
-    onset_s: float | None,
+    onset: Onset,
 ) -> Grid:
     """Hypotheses around `rate_hz`, whose coarse neighbours are `spacing` (relative) away.
 
@@ -60,8 +61,11 @@ def make_grid(
     rates_hz = rate_hz * (1.0 + np.arange(-fine, fine + 1) / (2 * fine + 1) * spacing)
     lengths = ticks / rates_hz / motion.step_s
     rolling = numbered > 1
-    if onset_s is not None:
-        starts = np.array([(onset_s - motion.start_s) / motion.step_s + lead])
+    if isinstance(onset, OnsetRange):
+        bounds = (np.array([onset.low_s, onset.high_s]) - motion.start_s) / motion.step_s + lead
+        starts = np.arange(np.floor(bounds[0]), np.ceil(bounds[1]) + 1.0)
+    elif onset is not None:
+        starts = np.array([(onset - motion.start_s) / motion.step_s + lead])
     else:
         starts = np.arange(available if rolling else int(np.ceil(lengths.max())), dtype=np.float64)
     numbers = np.arange(numbered if rolling else int(np.ceil(available / lengths.min())) + 1)

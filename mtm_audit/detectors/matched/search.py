@@ -1,7 +1,8 @@
 """Timing by matched filtering: which clock rate and which window phase explain the motion best.
 
 First each window's evidence, gains unknown, is folded over the recording at every rate and onset; then the best
-hypotheses are weighed again with one set of gains for all windows, and the winner's surroundings in half cells.
+hypotheses are weighed again with one set of gains for all windows, and the winner's surroundings in half cells. Where
+the onset is known, all rates are weighed so at once.
 Signs, rotations and mirrors of the camera do not matter. All of it is done for each codebook alike.
 """
 
@@ -14,12 +15,14 @@ from mtm_audit.detectors.matched.coherent import coherent_evidence
 from mtm_audit.detectors.matched.correlate import Heard, Prepared, Tones, evidence_by_lag, hear, stacked_tones
 from mtm_audit.detectors.matched.hypotheses import Grid, Hypothesis, fold, make_grid
 from mtm_audit.detectors.matched.motion import Motion
-from mtm_audit.timing import Timing
+from mtm_audit.timing import Onset, OnsetRange, Timing
 from mtm_audit.tracks import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel, Scheme
 
 SEARCHED_RATES = 0.2
+# Where the onset is bounded by clocks that follow UTC, these run alike.
+TIMED_RATES = 0.02
 _PHASE_ERROR_RAD = 0.6
 _PEAKS_PER_RATE = 8
 _WEIGHED = 64
@@ -42,56 +45,94 @@ class _Candidate:
     hypothesis: Hypothesis
 
 
-def candidate_rates(scheme: Scheme, channel: Channel) -> Floats:
-    """Rates over +-20 %, as far apart as the highest tone's phase at a window's ends allows; nominal among them."""
+# What all codebooks share at one coarse rate, by its number.
+_Place = Callable[[int], tuple[Heard, Grid]]
+_Report = Callable[[float], None]
+
+
+def candidate_rates(scheme: Scheme, channel: Channel, onset: Onset) -> Floats:
+    """Rates that are searched, as far apart as the highest tone's phase at a window's ends allows; nominal among them.
+
+    They span +-20 %; where clocks that follow UTC bound the onset, they bound the rate as well.
+    """
+    searched = TIMED_RATES if isinstance(onset, OnsetRange) else SEARCHED_RATES
     window_s = scheme.window_ticks(channel) / scheme.rate_hz
     step = 2.0 * _PHASE_ERROR_RAD / (np.pi * scheme.band_hz[1] * window_s)
-    count = int(np.ceil(SEARCHED_RATES / step))
-    rates: Floats = scheme.rate_hz * (1.0 + np.arange(-count, count + 1) * (SEARCHED_RATES / count))
+    count = int(np.ceil(searched / step))
+    rates: Floats = scheme.rate_hz * (1.0 + np.arange(-count, count + 1) * (searched / count))
     return rates
 
 
-def lead_cells(scheme: Scheme, channel: Channel, motion: Motion) -> int:
+def lead_cells(scheme: Scheme, channel: Channel, motion: Motion, onset: Onset) -> int:
     """Cells before the recording in which a window may begin that it sees the end of."""
-    return int(np.ceil(scheme.window_ticks(channel) / candidate_rates(scheme, channel)[0] / motion.step_s))
+    return int(np.ceil(scheme.window_ticks(channel) / candidate_rates(scheme, channel, onset)[0] / motion.step_s))
 
 
-def waveform_sets(scheme: Scheme, channel: Channel, motion: Motion) -> int:
-    """How many windows with waveforms of their own a recording may hold: 1 under the fixed schedule."""
+def waveform_sets(scheme: Scheme, channel: Channel, motion: Motion, onset: Onset) -> int:
+    """How many windows with waveforms of their own begin before the recording ends: 1 under the fixed schedule."""
     if scheme.schedule == "fixed":
         return 1
-    fastest_hz = float(candidate_rates(scheme, channel)[-1])
-    return int(np.ceil(len(motion.seen) * motion.step_s * fastest_hz / scheme.window_ticks(channel)))
+    origin_s = onset.low_s if isinstance(onset, OnsetRange) else motion.start_s if onset is None else onset
+    end_s = motion.start_s + len(motion.seen) * motion.step_s
+    fastest_hz = float(candidate_rates(scheme, channel, onset)[-1])
+    return int(np.ceil((end_s - min(origin_s, motion.start_s)) * fastest_hz / scheme.window_ticks(channel)))
 
 
 def search_timings(
     codebooks: Sequence[Codebook],
     channel: Channel,
     prepared: Prepared,
-    onset_s: float | None,
+    onset: Onset,
     progress: Callable[[float], None] | None = None,
 ) -> list[Found]:
-    """For each codebook the best timing: rates over +-20 %, and onsets over the whole recording unless it is known.
+    """For each codebook the best timing: rates, and onsets as far as they are not known.
 
-    Under the fixed schedule the onset found is that of the first window in step with the message.
+    Rates lie within +-20 %; where clocks bound the onset, they bound the rate as well. Under the fixed schedule the
+    onset found is that of the first window in step with the message.
     """
     scheme, motion = codebooks[0].scheme, prepared.motion
     ticks = scheme.window_ticks(channel)
-    rates_hz = candidate_rates(scheme, channel)
-    lead = lead_cells(scheme, channel, motion)
-    windows = waveform_sets(scheme, channel, motion)
+    rates_hz = candidate_rates(scheme, channel, onset)
+    lead = lead_cells(scheme, channel, motion, onset)
+    windows = waveform_sets(scheme, channel, motion, onset)
     tones = [[stacked_tones(codebook, channel, number) for number in range(windows)] for codebook in codebooks]
     spacing = float(rates_hz[1] - rates_hz[0]) / scheme.rate_hz
 
     def place(coarse: int) -> tuple[Heard, Grid]:
         rate_hz = float(rates_hz[coarse])
-        grid = make_grid(motion, scheme.rate_hz, rate_hz, spacing, ticks, lead, windows, onset_s)
+        grid = make_grid(motion, scheme.rate_hz, rate_hz, spacing, ticks, lead, windows, onset)
         return hear(prepared, codebooks[0], channel, rate_hz, lead), grid
 
-    candidates: list[list[_Candidate]] = [[] for _ in codebooks]
-    for coarse in range(len(rates_hz)):
+    def report(fraction: float) -> None:
         if progress is not None:
-            progress(0.5 * coarse / len(rates_hz))
+            progress(fraction)
+
+    if isinstance(onset, int | float):
+        return _rates_at_known_onset(place, len(rates_hz), tones, motion, lead, report)
+    return _onsets_and_rates(place, len(rates_hz), tones, motion, lead, report)
+
+
+def _rates_at_known_onset(
+    place: _Place, rates: int, tones: Sequence[Sequence[Tones]], motion: Motion, lead: int, report: _Report
+) -> list[Found]:
+    """Only the rate is open, so that every fine rate can be weighed with one set of gains."""
+    best: list[Found | None] = [None] * len(tones)
+    for coarse in range(rates):
+        report(coarse / rates)
+        heard, grid = place(coarse)
+        for number, numbered in enumerate(tones):
+            found = _surroundings(heard, grid, numbered, 0, motion, lead, onset_known=True)
+            known = best[number]
+            best[number] = found if known is None or found.evidence > known.evidence else known
+    return [found for found in best if found is not None]
+
+
+def _onsets_and_rates(
+    place: _Place, rates: int, tones: Sequence[Sequence[Tones]], motion: Motion, lead: int, report: _Report
+) -> list[Found]:
+    candidates: list[list[_Candidate]] = [[] for _ in tones]
+    for coarse in range(rates):
+        report(0.5 * coarse / rates)
         heard, grid = place(coarse)
         for number, numbered in enumerate(tones):
             evidence = np.stack([evidence_by_lag(tone, heard) for tone in numbered])
@@ -107,14 +148,12 @@ def search_timings(
     found_at: dict[int, Found] = {}
     winning = sorted({winner.coarse for _, winner in best})
     for done, coarse in enumerate(winning):
-        if progress is not None:
-            progress(0.5 + 0.5 * done / len(winning))
+        report(0.5 + 0.5 * done / len(winning))
         heard, grid = place(coarse)
         for number, (_, winner) in enumerate(best):
             if winner.coarse == coarse:
                 start = winner.hypothesis.start
-                known = onset_s is not None
-                found_at[number] = _surroundings(heard, grid, tones[number], start, motion, lead, onset_known=known)
+                found_at[number] = _surroundings(heard, grid, tones[number], start, motion, lead, onset_known=False)
     return [found_at[number] for number in range(len(best))]
 
 
