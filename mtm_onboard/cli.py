@@ -9,6 +9,7 @@ from importlib import import_module
 _COMMANDS = (
     "mtm_onboard.commands.keygen",
     "mtm_onboard.commands.show",
+    "mtm_onboard.commands.doctor",
     "mtm_onboard.commands.run",
     "mtm_onboard.commands.send",
     "mtm_onboard.commands.status",

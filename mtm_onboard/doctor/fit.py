@@ -1,0 +1,78 @@
+"""Whether a robot's configuration and its key fit each other."""
+
+import math
+
+from mtm_onboard.config import RobotConfig
+from mtm_onboard.doctor.finding import Finding
+from mtm_onboard.motion import AXES
+from mtm_onboard.protocol import Channel, Key, MtmError, Scheme
+
+# Parts of the ticks whose noise a limit may cut: beyond the first auditors notice, beyond the second they read little.
+_MANY, _MOST = 0.01, 0.5
+
+
+def check_fit(config: RobotConfig, key: Key) -> Finding:
+    """The channel is the key's, its axes are a body's, and the limits leave the noise whole."""
+    try:
+        channel = key.scheme.channel(config.robot.channel)
+    except MtmError as error:
+        return Finding("fit", "fail", f"[robot] channel: {error}")
+    strange = [axis for axis in channel.axes if axis not in AXES]
+    if strange:
+        return Finding(
+            "fit", "fail",
+            f"channel {channel.name} has the axis {strange[0]}, which no body velocity has; choose another channel",
+        )  # fmt: skip
+    if "vy" in channel.axes and config.transport_options.get("profile") == "rover":
+        return Finding(
+            "fit", "fail",
+            f"channel {channel.name} moves the robot sideways, which a rover cannot; choose a channel on vx and wz",
+        )  # fmt: skip
+    return _check_limits(config, key.scheme, channel)
+
+
+def _check_limits(config: RobotConfig, scheme: Scheme, channel: Channel) -> Finding:
+    parts = _parts_cut(config, scheme, channel)
+    limit, part = max(parts.items(), key=lambda item: item[1])
+    figures = {"cut_part": round(part, 6)}
+    if part <= _MANY:
+        return Finding(
+            "fit", "pass",
+            f"channel {channel.name} on {', '.join(channel.axes)}, sigma {channel.sigma:g}: at a standstill the limits "
+            "leave the noise whole", figures,
+        )  # fmt: skip
+    return Finding(
+        "fit", "fail" if part > _MOST else "warn",
+        f"even at a standstill {limit} cuts the noise of channel {channel.name} in {100 * part:.0f}% of the ticks; "
+        f"raise it, or make a key with a sigma below {channel.sigma:g}", figures,
+    )  # fmt: skip
+
+
+def _parts_cut(config: RobotConfig, scheme: Scheme, channel: Channel) -> dict[str, float]:
+    """Part of the ticks that each limit cuts, by its name, for Gaussian noise around a standstill."""
+    limits, sigma = config.limits, channel.sigma
+    straight = len({"vx", "vy"} & set(channel.axes))
+    inside = math.erf(limits.noise_sigmas / math.sqrt(2.0))
+    parts = {
+        "noise_sigmas": 1.0 - inside ** len(channel.axes),
+        "speed_mps": _beyond(limits.speed_mps / sigma, straight),
+        "turn_rate_radps": _beyond(limits.turn_rate_radps / sigma, int("wz" in channel.axes)),
+    }
+    if limits.acceleration_mps2 is not None:
+        step = limits.acceleration_mps2 / scheme.rate_hz
+        parts["acceleration_mps2"] = _beyond(step / (sigma * _relative_change(scheme)), straight)
+    return parts
+
+
+def _beyond(bound: float, axes: int) -> float:
+    """Probability that the norm of as many unit Gaussians is above `bound`; 0 for none of them."""
+    if axes == 0:
+        return 0.0
+    return math.exp(-0.5 * bound * bound) if axes == 2 else math.erfc(bound / math.sqrt(2.0))
+
+
+def _relative_change(scheme: Scheme) -> float:
+    """Standard deviation of the noise's change from tick to tick, in sigmas, for power spread evenly over the band."""
+    low, high = (2.0 * math.pi * edge_hz / scheme.rate_hz for edge_hz in scheme.band_hz)
+    correlation = (math.sin(high) - math.sin(low)) / (high - low)
+    return math.sqrt(2.0 * (1.0 - correlation))

@@ -1,0 +1,78 @@
+import subprocess
+import sys
+
+import pytest
+
+from mtm_onboard.config import RealtimeSettings
+from mtm_onboard.doctor.host import check_clock, check_loop, check_processors, is_synchronised, lateness_finding
+from mtm_onboard.loop import LoopStats
+from tests.onboard.schemes import small_scheme
+
+SCHEME = small_scheme(band_hz=(0.5, 5.0))
+
+
+def test_a_rolling_schedule_fails_without_a_synchronised_clock_and_a_fixed_one_does_not():
+    assert [check_clock("rolling", state).status for state in (True, False, None)] == ["pass", "fail", "warn"]
+    assert [check_clock("fixed", state).status for state in (True, False, None)] == ["pass", "warn", "warn"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no adjtimex")
+def test_the_kernel_is_asked_as_others_ask_it(monkeypatch):
+    program = "import ctypes; b = ctypes.create_string_buffer(1024); print(ctypes.CDLL(None).adjtimex(b))"
+    asked = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    # Its answer is TIME_ERROR (5) for a clock that is not synchronised.
+    assert is_synchronised() is (int(asked.stdout) != 5)
+
+
+def test_a_system_that_does_not_say_is_neither(monkeypatch):
+    class Silent:
+        def __init__(self, answer):
+            if answer is not None:
+                self.adjtimex = lambda state: answer
+
+    for answer in (None, -1):
+        monkeypatch.setattr("ctypes.CDLL", lambda name, answer=answer: Silent(answer))
+        assert is_synchronised() is None
+
+
+@pytest.mark.parametrize(
+    ("governors", "status"),
+    [([], "pass"), (["performance"] * 2, "pass"), (["schedutil", "powersave"], "warn")],
+)
+def test_processors_that_save_power_are_a_warning(tmp_path, governors, status):
+    for number, governor in enumerate(governors):
+        place = tmp_path / f"cpu{number}" / "cpufreq"
+        place.mkdir(parents=True)
+        (place / "scaling_governor").write_text(f"{governor}\n")
+    assert check_processors(tmp_path).status == status
+
+
+@pytest.mark.parametrize(("late_ms", "status"), [(1.0, "pass"), (8.0, "pass"), (10.0, "warn"), (30.0, "fail")])
+def test_lateness_is_judged_as_phase_at_the_top_of_the_band(late_ms, status):
+    stats = LoopStats()
+    for _ in range(100):
+        stats.lateness.record(late_ms * 1e-3)
+    finding = lateness_finding(stats, SCHEME)
+    assert finding.status == status
+    assert finding.figures["phase_p99_deg"] == pytest.approx(1.8 * late_ms, rel=0.13)
+    assert finding.figures["late_max_ms"] == late_ms
+    assert (";" in finding.text) == (status != "pass")
+
+
+def test_a_single_late_tick_among_many_is_told_and_forgiven():
+    stats = LoopStats()
+    for tick in range(1000):
+        stats.lateness.record(0.5 if tick == 7 else 1e-4)
+    finding = lateness_finding(stats, SCHEME)
+    assert finding.status == "pass"
+    assert "500.00 ms at most" in finding.text
+
+
+@pytest.mark.realtime
+def test_the_loop_is_watched_as_long_as_asked_and_as_real_time_asks():
+    realtime, loop = check_loop(RealtimeSettings(cpu=1023), SCHEME, 0.2)
+    assert realtime.status == "warn"
+    assert "cpu 1023" in realtime.text
+    assert 1 <= loop.figures["ticks"] + loop.figures["missed"] <= 13
+    realtime, _ = check_loop(RealtimeSettings(), SCHEME, 0.02)
+    assert realtime.status == "pass"
