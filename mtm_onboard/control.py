@@ -1,8 +1,9 @@
-"""What an operator may ask of a running robot: another message, how it fares, and the stop.
+"""What an operator may ask of a running robot: another message or none, how it fares, and the stop.
 
 Requests and answers are tables, one JSON line each on the control socket:
 
     {"command": "send", "content": {"number": 7}}    or {"text": "..."}, {"hex": "..."}, {"symbols": [...]}
+    {"command": "silence"}
     {"command": "status"}
     {"command": "stop"}
 """
@@ -15,7 +16,7 @@ from typing import Any
 from mtm_onboard.guard import Guard
 from mtm_onboard.journal import Journal
 from mtm_onboard.loop import LoopStats
-from mtm_onboard.message import Message, content_from_table, message_of
+from mtm_onboard.message import SILENCE, Played, Silence, content_from_table, message_of
 from mtm_onboard.modulator import Modulator
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.source import Source
@@ -37,7 +38,7 @@ class Session:
 
     robot: str
     key: Key
-    modulator: Modulator | None
+    modulator: Modulator
     guard: Guard
     source: Source
     transport: Transport
@@ -56,7 +57,7 @@ class Control:
         self._one_message_at_a_time = threading.Lock()
         self._messages = 1
         self._answers: dict[str, Callable[[Table], Table]] = {
-            "send": self._send, "status": self._status, "stop": self._stop,
+            "send": self._send, "silence": self._silence, "status": self._status, "stop": self._stop,
         }  # fmt: skip
 
     def answer(self, request: Table) -> Table:
@@ -71,35 +72,42 @@ class Control:
         return self._answers[command](request)
 
     def _send(self, request: Table) -> Table:
-        session, content = self._session, request.get("content")
-        modulator = session.modulator
-        if modulator is None:
-            raise MtmError("this robot runs without a message; end it and start it with one")
+        content = request.get("content")
         if not isinstance(content, dict):
             raise MtmError("the request has no content; give a number, text, hex or symbols")
         with self._one_message_at_a_time:
-            message = message_of(content_from_table(content), session.key, self._messages)
-            queued = modulator.queue(message)
-            tick = queued.start_tick(_PATIENCE_S)
-            if tick is None and not modulator.withdraw(queued):
-                # It was taken up at this very moment.
-                tick = queued.start_tick(_PATIENCE_S)
-            if tick is None:
-                raise MtmError("the robot's loop stands still and took up no message; see its status and its link")
+            message = message_of(content_from_table(content), self._session.key, self._messages)
+            answer = self._queue(message, f"message {message.number} begins here, {_words(content)}")
             self._messages += 1
-        replaced = _number(queued.replaced)
-        instead = "" if replaced is None else f", in the place of message {replaced}, which never began"
-        self._note(tick, f"message {message.number} begins here, {_words(content)}{instead}")
-        return self._when(tick) | {"number": message.number, "replaces": replaced}
+        return answer | {"number": message.number}
+
+    def _silence(self, _: Table) -> Table:
+        with self._one_message_at_a_time:
+            return self._queue(SILENCE, "silence begins here")
+
+    def _queue(self, played: Played, note: str) -> Table:
+        modulator = self._session.modulator
+        queued = modulator.queue(played)
+        tick = queued.start_tick(_PATIENCE_S)
+        if tick is None and not modulator.withdraw(queued):
+            # It was taken up at this very moment.
+            tick = queued.start_tick(_PATIENCE_S)
+        if tick is None:
+            raise MtmError("the robot's loop stands still and took up nothing; see its status and its link")
+        replaced = _name(queued.replaced)
+        instead = "" if replaced is None else f", in the place of {called(replaced)}, which never began"
+        self._note(tick, note + instead)
+        return self._when(tick) | {"replaces": replaced}
 
     def _status(self, _: Table) -> Table:
         session = self._session
         guard, stats, modulator, journal = session.guard, session.stats, session.modulator, session.journal
+        tick = session.tick()
         return {
             "robot": session.robot,
             "key": session.key.id,
             "scheme": session.key.scheme.fingerprint,
-            "tick": session.tick(),
+            "tick": tick,
             "sent": stats.sent,
             "missed": stats.missed,
             "overruns": stats.overruns,
@@ -110,8 +118,9 @@ class Control:
             "refused": session.source.refused + guard.refused,
             "late_p99_ms": round(1e3 * stats.lateness.quantile_s(0.99), 3),
             "stopped": guard.stopped,
-            "message": None if modulator is None else _number(modulator.message),
-            "waiting": None if modulator is None else _number(modulator.waiting),
+            "message": _name(modulator.message),
+            "waiting": _name(modulator.waiting),
+            "silent": not modulator.sends(tick),
             "journal_lost": None if journal is None else journal.lost,
             "link": session.transport.health(),
         }
@@ -131,8 +140,15 @@ class Control:
             self._session.journal.note(tick, text)
 
 
-def _number(message: Message | Sequence[int] | None) -> int | None:
-    return None if message is None or isinstance(message, Sequence) else message.number
+def called(name: int | str) -> str:
+    """What an answer names, a message's number or "silence", in words."""
+    return name if isinstance(name, str) else f"message {name}"
+
+
+def _name(played: Played | None) -> int | str | None:
+    if isinstance(played, Silence):
+        return "silence"
+    return None if played is None or isinstance(played, Sequence) else played.number
 
 
 def _words(content: Table) -> str:

@@ -1,5 +1,6 @@
 """Messages, as the modulator plays them: the symbols of each slot."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -22,6 +23,16 @@ class Message(Protocol):
     def symbols(self, slot: int) -> tuple[int, ...]:
         """The whole message's L symbols in the order in which `slot` plays them. May be called from any thread."""
         ...
+
+
+class Silence:
+    """Played in the place of a message: no noise at all."""
+
+
+SILENCE = Silence()
+
+# What a modulator plays; a sequence is one channel's own symbols of every slot.
+Played = Message | Sequence[int] | Silence
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_onboard.message import Message
+from mtm_onboard.message import Played, Silence
 from mtm_onboard.motion import AXES, BodyVelocity
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
@@ -26,7 +26,7 @@ _BREATH_S = 0.001
 class _Part:
     """A message from `start_tick` up to `end_tick`, and the rows that its noise comes from, by tick modulo rows."""
 
-    message: Message | Sequence[int]
+    message: Played
     start_tick: int
     end_tick: float
     noise: Floats
@@ -36,9 +36,9 @@ class _Part:
 class Queued:
     """A message that waits to be taken up by the loop. `replaced` is then the one that waited for the same boundary."""
 
-    def __init__(self, message: Message | Sequence[int], noise: Floats, offsets: Floats) -> None:
+    def __init__(self, message: Played, noise: Floats, offsets: Floats) -> None:
         self.message = message
-        self.replaced: Message | Sequence[int] | None = None
+        self.replaced: Played | None = None
         self._noise = noise
         self._offsets = offsets
         self._start_tick = 0
@@ -53,7 +53,7 @@ class Queued:
         self._waiting.release()
         return self._start_tick
 
-    def _take(self, start_tick: int, end_tick: float, replaced: Message | Sequence[int] | None = None) -> _Part:
+    def _take(self, start_tick: int, end_tick: float, replaced: Played | None = None) -> _Part:
         self._start_tick, self.replaced = start_tick, replaced
         self._waiting.release()
         return _Part(self.message, start_tick, end_tick, self._noise, self._offsets)
@@ -62,16 +62,15 @@ class Queued:
 class Modulator:
     """Plays a message from tick 0 on, again and again when `repeat` is set, until another is queued.
 
-    `message` says the whole message's symbols of each slot, or is a sequence of this channel's own l_c symbols. Tick 0
-    is the start of the codebook's first slot. Everything is a function of the tick number alone, so ticks that never
-    come shift nothing. Under the fixed schedule a message is computed before it is played; under the rolling schedule
-    the window being played and the next one are held, and `prepare` computes what comes after. Raises MtmError for an
-    unknown channel, a wrong number of symbols or a symbol outside the alphabet.
+    `message` says the whole message's symbols of each slot, or is a sequence of this channel's own l_c symbols, or
+    `SILENCE`, which has no noise. Tick 0 is the start of the codebook's first slot. Everything is a function of the
+    tick number alone, so ticks that never come shift nothing. Under the fixed schedule a message is computed before it
+    is played; under the rolling schedule the window being played and the next one are held, and `prepare` computes
+    what comes after. Raises MtmError for an unknown channel, a wrong number of symbols or a symbol outside the
+    alphabet.
     """
 
-    def __init__(
-        self, codebook: Codebook, channel_name: str, message: Message | Sequence[int], *, repeat: bool = True
-    ) -> None:
+    def __init__(self, codebook: Codebook, channel_name: str, message: Played, *, repeat: bool = True) -> None:
         scheme = codebook.scheme
         self.channel = channel = scheme.channel(channel_name)
         self._message_ticks = scheme.message_ticks
@@ -91,23 +90,24 @@ class Modulator:
         self._tick = -1
         self._queue: deque[Queued] = deque()
         self._next: _Part | None = None
-        self._part = self._queued(message)._take(0, self._end_tick(0))
+        self._part = self._queued(message)._take(0, self._end_tick(0, message))
         if self._rolling:
             for window in range(_KEPT_WINDOWS):
-                self._compute(window)
+                if self.sends(window * self._window_ticks):
+                    self._compute(window)
 
     @property
-    def message(self) -> Message | Sequence[int]:
-        """The message being played."""
+    def message(self) -> Played:
+        """The message being played, or SILENCE."""
         return self._part.message
 
     @property
-    def waiting(self) -> Message | Sequence[int] | None:
-        """The message that takes its place at the next boundary."""
+    def waiting(self) -> Played | None:
+        """What takes its place at the next boundary."""
         part = self._next
         return None if part is None else part.message
 
-    def queue(self, message: Message | Sequence[int]) -> Queued:
+    def queue(self, message: Played) -> Queued:
         """Play `message` from the next message boundary on; from any thread, and the loop waits for nothing.
 
         One that still waits for its boundary is replaced. Raises MtmError as the constructor does.
@@ -174,7 +174,8 @@ class Modulator:
         start_tick = self._boundary(tick) * self._message_ticks
         try:
             while True:
-                self._next = self._queue.popleft()._take(start_tick, self._end_tick(start_tick), self.waiting)
+                queued = self._queue.popleft()
+                self._next = queued._take(start_tick, self._end_tick(start_tick, queued.message), self.waiting)
         except IndexError:
             # All are taken, or the one that was seen has been withdrawn.
             pass
@@ -185,7 +186,7 @@ class Modulator:
         """Number of the message that begins next after `tick`."""
         return max(0, tick // self._message_ticks + 1)
 
-    def _queued(self, message: Message | Sequence[int], breath_s: float = 0.0) -> Queued:
+    def _queued(self, message: Played, breath_s: float = 0.0) -> Queued:
         """`message` with its noise, computed here under the fixed schedule; checks it under both."""
         symbols = self._own_symbols(message, self._codebook.first_slot + self._boundary(self._tick))
         if self._rolling:
@@ -197,8 +198,10 @@ class Modulator:
                 time.sleep(breath_s)
         return Queued(message, noise, offsets)
 
-    def _own_symbols(self, message: Message | Sequence[int], slot: int) -> Sequence[int]:
+    def _own_symbols(self, message: Played, slot: int) -> Sequence[int]:
         scheme, channel = self._codebook.scheme, self.channel
+        if isinstance(message, Silence):
+            return ()
         if not isinstance(message, Sequence):
             return channel_symbols(message.symbols(slot), scheme)[channel.name]
         if len(message) != channel.symbols:
@@ -211,7 +214,9 @@ class Modulator:
                 raise MtmError(f"symbol {symbol} is outside the alphabet; choose 0 to {scheme.alphabet_size - 1}")
         return message
 
-    def _end_tick(self, start_tick: int) -> float:
+    def _end_tick(self, start_tick: int, message: Played) -> float:
+        if isinstance(message, Silence):
+            return start_tick
         return np.inf if self._repeat else start_tick + self._message_ticks
 
     def _part_at(self, tick: int) -> _Part:

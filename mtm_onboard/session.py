@@ -16,7 +16,7 @@ from mtm_onboard.controlsocket import ControlSocket
 from mtm_onboard.guard import Guard
 from mtm_onboard.journal import Journal, JournalHeader
 from mtm_onboard.loop import LoopStats, run_loop
-from mtm_onboard.message import Content, message_of
+from mtm_onboard.message import SILENCE, Content, message_of
 from mtm_onboard.modulator import Modulator
 from mtm_onboard.protocol import Key, MtmError, Scheme
 from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
@@ -37,9 +37,10 @@ _EARLIEST_UNIX_S = 1_704_067_200.0
 
 @dataclass(frozen=True)
 class Plan:
-    """What to send and when: the message (None: base commands alone), from `start_unix_s` (None: at once) on.
+    """What to send and when: the message, from `start_unix_s` (None: at once) on.
 
-    Under the rolling schedule it starts with the next slot. The run ends `duration_s` after the message's start;
+    Without a message there is silence until the run is sent one. Under the rolling schedule the start is the next
+    slot's. The run ends `duration_s` after the message's start;
     without `repeat` the message is sent once.
     """
 
@@ -167,10 +168,8 @@ def _check_clock(now_unix_s: float) -> None:
         )
 
 
-def _modulator(key: Key, channel_name: str, plan: Plan, first_slot: int) -> Modulator | None:
-    if plan.message is None:
-        return None
-    message = message_of(plan.message, key)
+def _modulator(key: Key, channel_name: str, plan: Plan, first_slot: int) -> Modulator:
+    message = SILENCE if plan.message is None else message_of(plan.message, key)
     modulator = Modulator(key.codebook(first_slot), channel_name, message, repeat=plan.repeat)
     modulator.require_body_axes()
     return modulator

@@ -17,7 +17,9 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser = subparsers.add_parser("run", help="drive the robot: base commands in, base commands and message out")
     parser.add_argument("--config", required=True, type=Path, help="the robot's configuration (TOML)")
     parser.add_argument("--key", required=True, type=Path, help="the key file")
-    add_content(parser).add_argument("--no-message", action="store_true", help="base commands alone, without noise")
+    add_content(parser).add_argument(
+        "--no-message", action="store_true", help="no noise until mtm-onboard send gives a message"
+    )
     parser.add_argument("--no-repeat", action="store_true", help="send the message once, then base commands alone")
     parser.add_argument(
         "--duration", type=_seconds, default=math.inf, metavar="S", help="end this long after the message's start"

@@ -1,4 +1,4 @@
-"""`mtm-onboard send`: another message for a robot that runs."""
+"""`mtm-onboard send`: another message, or none, for a robot that runs."""
 
 import argparse
 
@@ -10,20 +10,21 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command and its options."""
     parser = subparsers.add_parser("send", help="give a running robot another message, from its next boundary on")
     add_robot(parser)
-    add_content(parser)
+    add_content(parser).add_argument("--silence", action="store_true", help="no message, and so no noise")
     parser.set_defaults(handler=_send)
 
 
 def _send(args: argparse.Namespace) -> int:
     from datetime import UTC, datetime
 
+    from mtm_onboard.control import called
     from mtm_onboard.controlsocket import ask
 
-    answer = ask(socket_path(args), {"command": "send", "content": content_table(args)})
+    request = {"command": "silence"} if args.silence else {"command": "send", "content": content_table(args)}
+    answer = ask(socket_path(args), request)
     start = datetime.fromtimestamp(answer["unix_s"], UTC)
     slot = "" if answer["slot"] is None else f", slot {answer['slot']}"
-    instead = "" if answer["replaces"] is None else f", in the place of message {answer['replaces']} that was waiting"
-    print(
-        f"message {answer['number']} begins at {start:%Y-%m-%d %H:%M:%S.%f} UTC ({answer['unix_s']:.6f}){slot}{instead}"
-    )
+    instead = "" if answer["replaces"] is None else f", in the place of {called(answer['replaces'])} that was waiting"
+    begins = called("silence" if args.silence else answer["number"])
+    print(f"{begins} begins at {start:%Y-%m-%d %H:%M:%S.%f} UTC ({answer['unix_s']:.6f}){slot}{instead}")
     return 0

@@ -7,7 +7,7 @@ from mtm_onboard.control import Control, Session
 from mtm_onboard.guard import Guard, Limits, Staleness
 from mtm_onboard.journal import Journal, JournalHeader, read_journal
 from mtm_onboard.loop import LoopStats
-from mtm_onboard.message import FramedMessage, message_of
+from mtm_onboard.message import SILENCE, FramedMessage, message_of
 from mtm_onboard.modulator import Modulator
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol import Key, MtmError
@@ -35,13 +35,14 @@ class Robot:
     """A session's parts, of which nothing moves."""
 
     def __init__(self, key: Key, content=None, journal: Journal | None = None) -> None:
+        self.tick = 55
         codebook = key.codebook(FIRST_SLOT)
-        self.modulator = None if content is None else Ticking(codebook, "a", message_of(content, key))
+        self.modulator = Ticking(codebook, "a", SILENCE if content is None else message_of(content, key))
         self.guard = Guard(Limits(1.0, 2.0), Staleness(), noise_sigma=0.1, period_s=0.02)
         self.stats = LoopStats()
         session = Session(
             "robot0", key, self.modulator, self.guard, HeldSource(), NullTransport(), self.stats, journal,
-            lambda: 55, START_UNIX_S, FIRST_SLOT,
+            lambda: self.tick, START_UNIX_S, FIRST_SLOT,
         )  # fmt: skip
         self.control = Control(session)
 
@@ -102,9 +103,41 @@ def test_a_loop_that_stands_still_takes_up_nothing_and_the_client_hears_so(monke
     assert robot.modulator.waiting is None
 
 
-def test_a_robot_without_a_message_gets_none():
-    with pytest.raises(MtmError, match="without a message"):
-        Robot(key_of()).send(number=1)
+@pytest.mark.parametrize(("schedule", "slot"), [("rolling", FIRST_SLOT + 2), ("fixed", None)])
+def test_a_robot_that_began_in_silence_gets_its_first_message_at_the_next_boundary(schedule, slot):
+    robot = Robot(key_of(schedule=schedule))
+    robot.modulator.now = 130
+    assert status(robot) == ("silence", None, True)
+    answer = robot.send(number=9)
+    assert (answer["tick"], answer["slot"], answer["number"], answer["replaces"]) == (240, slot, 1, None)
+    assert status(robot) == ("silence", 1, True)
+    robot.modulator.prepare(240)
+    assert status(robot, tick=250) == (1, None, False)
+
+
+def test_silence_ends_the_message_at_the_next_boundary(tmp_path):
+    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (0,) * 4, True, 50.0, 0.0, None)
+    with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
+        robot = Robot(key_of(), 7, journal)
+        robot.send(number=3)
+        answer = robot.control.answer({"command": "silence"})
+        assert answer == {"tick": 120, "unix_s": START_UNIX_S + 2.4, "slot": FIRST_SLOT + 1, "replaces": 1}
+        assert status(robot) == (0, "silence", False)
+        robot.modulator.prepare(120)
+        assert status(robot, tick=121) == ("silence", None, True)
+        robot.modulator.now = 150
+        robot.control.answer({"command": "silence"})
+        assert robot.send(number=4)["replaces"] == "silence"
+    assert [event.text for event in read_journal(journal.path).events][1::2] == [
+        "silence begins here, in the place of message 1, which never began",
+        "message 2 begins here, number 4, in the place of silence, which never began",
+    ]
+
+
+def status(robot: Robot, tick: int = 55):
+    robot.tick = tick
+    answer = robot.control.answer({"command": "status"})
+    return answer["message"], answer["waiting"], answer["silent"]
 
 
 def test_the_stop_is_latched_and_noted_in_the_journal(tmp_path):
@@ -134,7 +167,6 @@ def test_the_status_says_how_the_run_fares_in_json():
         "waiting": 1,
     }  # fmt: skip
     assert (status["stopped"], status["journal_lost"], status["link"]) == (False, None, {})
-    assert Robot(key_of()).control.answer({"command": "status"})["message"] is None
 
 
 @pytest.mark.parametrize(
@@ -142,8 +174,9 @@ def test_the_status_says_how_the_run_fares_in_json():
     [
         ({}, "command None is unknown"),
         ({"command": ["send"]}, "is unknown"),
-        ({"command": "dance"}, "choose one of: send, status, stop"),
+        ({"command": "dance"}, "choose one of: send, silence, status, stop"),
         ({"command": "stop", "content": {}}, "unknown field 'content'"),
+        ({"command": "silence", "content": {}}, "unknown field 'content'"),
         ({"command": "send"}, "no content"),
         ({"command": "send", "content": 7}, "no content"),
     ],

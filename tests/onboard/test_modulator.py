@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_onboard.message import PlainMessage
+from mtm_onboard.message import SILENCE, PlainMessage
 from mtm_onboard.modulator import Modulator
 from mtm_onboard.motion import BodyVelocity
 from mtm_onboard.protocol import Channel, MtmError
@@ -134,15 +134,36 @@ def test_a_queued_message_that_is_not_repeated_follows_the_silence_and_ends_in_s
 
 
 @pytest.mark.parametrize("schedule", ["fixed", "rolling"])
-def test_nothing_is_derived_in_the_tick_that_sends_when_the_message_changes(schedule):
+@pytest.mark.parametrize("first", [(3, 0, 2), SILENCE])
+def test_nothing_is_derived_in_the_tick_that_sends_when_the_message_changes(schedule, first):
     book = small_codebook(schedule=schedule)
-    modulator = Modulator(book, "b", (3, 0, 2))
-    for tick in range(400):
-        if tick in (50, 119, 200):
-            modulator.queue((tick % 4, 1, 2))
+    modulator = Modulator(book, "b", first)
+    changes = {50: (2, 1, 2), 119: (3, 1, 2), 200: SILENCE, 290: (0, 1, 2)}
+    for tick in range(600):
+        if tick in changes:
+            modulator.queue(changes[tick])
         with patch.object(book, "samples", side_effect=AssertionError("derived while sending")):
             modulator.add(tick, BASE)
         modulator.prepare(tick)
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+def test_a_run_begun_in_silence_plays_what_it_is_sent_from_the_boundary_on_until_silence_is_sent(schedule):
+    book = small_codebook(schedule=schedule)
+    modulator = Modulator(book, "b", SILENCE)
+    assert modulator.message is SILENCE
+    assert not played(modulator, range(-10, 130)).any()
+    assert modulator.add(60, BASE) is BASE
+    sent = modulator.queue((3, 0, 2))
+    assert not played(modulator, range(130, 240)).any()
+    first = played(modulator, range(240, 400))
+    ended = modulator.queue(SILENCE)
+    rest = played(modulator, range(400, 900))
+    assert (sent.start_tick(0.0), ended.start_tick(0.0)) == (240, 480)
+    whole = played(Modulator(book, "b", (3, 0, 2)), range(480))
+    assert np.array_equal(np.concatenate([first, rest[:80]]), whole[240:])
+    assert not rest[80:].any()
+    assert modulator.message is SILENCE
 
 
 @pytest.mark.parametrize("schedule", ["fixed", "rolling"])
@@ -159,20 +180,24 @@ def test_a_stall_across_the_boundary_of_a_change_shifts_nothing(schedule):
 @given(
     st.sampled_from(["fixed", "rolling"]),
     st.integers(-200, 10),
-    st.lists(st.tuples(st.integers(1, 90), st.none() | st.integers(0, 3)), max_size=40),
+    st.none() | st.just(SILENCE) | st.integers(0, 3),
+    st.lists(st.tuples(st.integers(1, 90), st.none() | st.just(SILENCE) | st.integers(0, 3)), max_size=40),
 )
-def test_whatever_is_queued_and_missed_each_tick_has_its_own_message_s_noise(schedule, tick, steps):
+def test_whatever_is_queued_and_missed_each_tick_has_its_own_message_s_noise(schedule, tick, first, steps):
     book = small_codebook(schedule=schedule)
     channel = book.scheme.channel("a")
-    modulator = Modulator(book, "a", (0,))
-    starts = {0: 0}
+    first = SILENCE if first is None else first
+    modulator = Modulator(book, "a", first if first is SILENCE else (first,))
+    starts = {0: first}
     for step, symbol in steps:
         tick += step
         if symbol is not None:
-            modulator.queue((symbol,))
+            modulator.queue(symbol if symbol is SILENCE else (symbol,))
         message = max(0, tick // 120)
         symbol_now = starts[max(start for start in starts if start <= message)]
-        expected = book.samples(channel, message, [symbol_now])[0, :, tick % 120] if tick >= 0 else np.zeros(2)
+        silent = tick < 0 or symbol_now is SILENCE
+        expected = np.zeros(2) if silent else book.samples(channel, message, [symbol_now])[0, :, tick % 120]
+        assert modulator.sends(tick) is not silent
         assert np.array_equal(modulator.perturbation(tick), expected)
         modulator.prepare(tick)
         if symbol is not None:

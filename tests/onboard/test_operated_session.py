@@ -122,6 +122,34 @@ def test_a_message_sent_to_a_running_robot_begins_exactly_at_the_boundary_that_t
     assert not Path(config.control.socket).exists()
 
 
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+def test_a_robot_started_without_a_message_says_nothing_until_it_is_sent_one_and_again_after_silence(config, schedule):
+    key = replace(KEY, scheme=replace(SCHEME, schedule=schedule))
+    with Running(config, key, Plan(None)) as running:
+        while (before := asked(config, command="status"))["tick"] < 3:
+            pass
+        begun = asked(config, command="send", content={"number": 50})
+        while asked(config, command="status")["tick"] < begun["tick"] + 3:
+            pass
+        during = asked(config, command="status")
+        ended = asked(config, command="silence")
+        while asked(config, command="status")["tick"] < ended["tick"] + 3:
+            pass
+        outcome = running.end()
+    assert (before["message"], before["silent"], during["message"], during["silent"]) == ("silence", True, 1, False)
+    assert begun["tick"] % 30 == ended["tick"] % 30 == 0
+    record = read_journal(outcome.journal.path)
+    assert record.header.symbols is None
+    noisy = (record.sent != record.base).any(axis=1)
+    within = (record.ticks >= begun["tick"]) & (record.ticks < ended["tick"])
+    assert not noisy[~within].any()
+    assert np.mean(noisy[within]) > 0.9
+    modulator = Modulator(key.codebook((begun["slot"] or 0) - begun["tick"] // 30), "a", message_of(50, key, 1))
+    noise = np.array([modulator.perturbation(tick) for tick in record.ticks.tolist()])
+    calm = within & (record.flags == NOISE)
+    assert (record.sent - record.base)[calm, :2] == pytest.approx(0.1 * noise[calm], abs=1e-6)
+
+
 def test_the_operator_s_stop_over_the_socket_holds_to_the_end_of_the_run(config):
     with Running(config, replace(KEY, scheme=FIXED), Plan(3)) as running:
         assert asked(config, command="stop") == {"stopped": True}

@@ -116,6 +116,8 @@ def robot(tmp_path):
             slot = 7 if "text" in request["content"] else None
             replaces = 1 if "hex" in request["content"] else None
             return {"tick": 120, "unix_s": 1_800_000_000.25, "slot": slot, "number": 2, "replaces": replaces}
+        if request["command"] == "silence":
+            return {"tick": 120, "unix_s": 1_800_000_000.25, "slot": 7, "replaces": "silence"}
         if request["command"] == "status":
             return {"robot": "r0", "late_p99_ms": 0.5, "message": None, "link": {"heartbeats": 3}}
         return {"stopped": True}
@@ -138,6 +140,21 @@ def test_send_asks_for_the_message_and_says_when_it_begins(config, robot, capsys
     assert main(["send", "--config", str(config), "=".join(content)]) == 0
     assert robot == [{"command": "send", "content": request_}]
     assert says in capsys.readouterr().out
+
+
+def test_send_asks_for_silence_and_says_when_it_begins(config, robot, capsys):
+    assert main(["send", "--config", str(config), "--silence"]) == 0
+    assert robot == [{"command": "silence"}]
+    assert capsys.readouterr().out == (
+        "silence begins at 2027-01-15 08:00:00.250000 UTC (1800000000.250000), slot 7, "
+        "in the place of silence that was waiting\n"
+    )
+
+
+def test_silence_is_no_content_beside_another(config, robot):
+    with pytest.raises(SystemExit):
+        main(["send", "--config", str(config), "--silence", "--message", "7"])
+    assert robot == []
 
 
 def test_send_says_the_robot_s_sentence_when_it_refuses(config, robot, capsys):
