@@ -1,7 +1,11 @@
 """Time of one tick on the robot; `make bench` shows it."""
 
+import time
+import tracemalloc
+from collections.abc import Callable
 from itertools import count
 
+import numpy as np
 import pytest
 
 from mtm_onboard.guard import Guard, Limits, Staleness
@@ -27,8 +31,8 @@ def guard() -> Guard:
     return Guard(Limits(1.0, 2.0), Staleness(), noise_sigma=0.1, period_s=0.02)
 
 
-@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
-def test_modulator_and_guard_take_a_few_microseconds_a_tick(benchmark, schedule):
+def modulated_and_guarded(schedule: str) -> Callable[[], BodyVelocity]:
+    """The next tick of a modulator and a guard, each time it is called."""
     plays, checks, ticks = modulator(schedule), guard(), count()
 
     def tick() -> BodyVelocity:
@@ -39,7 +43,50 @@ def test_modulator_and_guard_take_a_few_microseconds_a_tick(benchmark, schedule)
         plays.prepare(number)
         return sent
 
-    assert benchmark(tick) != BASE
+    return tick
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+def test_modulator_and_guard_take_a_few_microseconds_a_tick(benchmark, schedule):
+    assert benchmark(modulated_and_guarded(schedule)) != BASE
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+def test_modulator_and_guard_take_20_microseconds_of_the_processor_at_most(capsys, schedule):
+    tick = modulated_and_guarded(schedule)
+    times_ns = np.empty(10_000)
+    for number in range(len(times_ns)):
+        begun_ns = time.thread_time_ns()
+        tick()
+        times_ns[number] = time.thread_time_ns() - begun_ns
+    with capsys.disabled():
+        print(
+            f"\nmodulator and guard, {schedule} schedule: {1e-3 * np.median(times_ns):.1f} us a tick in the middle, "
+            f"{1e-3 * np.quantile(times_ns, 0.99):.1f} us p99 of {len(times_ns)}"
+        )
+    assert np.median(times_ns) <= 20_000
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+def test_ten_thousand_ticks_leave_no_memory_taken(capsys, schedule):
+    tick = modulated_and_guarded(schedule)
+    # Two messages, after which whatever is kept has been kept once.
+    for _ in range(1200):
+        tick()
+    tracemalloc.start()
+    try:
+        for _ in range(1200):
+            tick()
+        before_bytes, _ = tracemalloc.get_traced_memory()
+        for _ in range(10_000):
+            tick()
+        grown_bytes = tracemalloc.get_traced_memory()[0] - before_bytes
+    finally:
+        tracemalloc.stop()
+    with capsys.disabled():
+        print(f"\nmodulator and guard, {schedule} schedule: {grown_bytes} bytes more after 10,000 ticks")
+    # Numbers of one object in the place of another differ by a few bytes; one float a tick would be 240,000.
+    assert grown_bytes < 2000
 
 
 def test_a_whole_tick_on_a_trivial_link_takes_a_few_microseconds(benchmark):
