@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test lint bench firmware deb clean
+.PHONY: setup demo test lint bench firmware deb deb-test clean
 
 setup: $(STAMP)
 
@@ -35,8 +35,12 @@ firmware: setup
 deb:
 	$(PYTHON) packaging/build_deb.py
 
+# As root, with debootstrap and a network: installs the package into a clean Debian and drives a simulated robot there.
+deb-test: setup
+	MTM_CLEAN_ROOT=1 $(BIN)/pytest tests/packaging/test_clean_root.py -s
+
 bench: setup
-	$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-only -s
+	$(BIN)/pytest tests/benchmarks --benchmark-enable -s
 
 clean:
 	rm -rf $(VENV) out build dist firmware_shim/build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -85,8 +85,8 @@ def test_ten_thousand_ticks_leave_no_memory_taken(capsys, schedule):
         tracemalloc.stop()
     with capsys.disabled():
         print(f"\nmodulator and guard, {schedule} schedule: {grown_bytes} bytes more after 10,000 ticks")
-    # Numbers of one object in the place of another differ by a few bytes; one float a tick would be 240,000.
-    assert grown_bytes < 2000
+    # What is reused settles within a few thousand; a single float a tick would be 240,000.
+    assert grown_bytes < 8000
 
 
 def test_a_whole_tick_on_a_trivial_link_takes_a_few_microseconds(benchmark):
