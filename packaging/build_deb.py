@@ -59,7 +59,8 @@ def lay_out(tree: Path) -> None:
     licence = (ROOT / "LICENSE").read_text(encoding="utf-8")
     indented = "".join(f" {line or '.'}\n" for line in licence.splitlines())
     place(documents / "copyright", COPYRIGHT + indented)
-    place(documents / "README.md", (ROOT / "README.md").read_text(encoding="utf-8"))
+    for page in ("README.md", "docs/doctor.md"):
+        place(documents / page, (ROOT / page).read_text(encoding="utf-8"))
     for example in (ROOT / "docs/robot.example.toml", HERE / "cloud-init/user-data.yaml"):
         place(documents / "examples" / example.name, example.read_text(encoding="utf-8"))
     (tree / "etc/mtm").mkdir(parents=True)

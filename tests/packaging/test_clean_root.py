@@ -60,6 +60,8 @@ def debian(tmp_path_factory):
     if not (folder / "usr/bin/python3").exists():
         include = f"--include={PACKAGES}"
         subprocess.run(["debootstrap", "--variant=minbase", include, "bookworm", folder], check=True)
+        # Else no user but root gets into it when the folder was made for one user alone.
+        folder.chmod(0o755)
     shutil.rmtree(folder / HOME, ignore_errors=True)
     yield folder
     if given is None:
@@ -76,7 +78,8 @@ def robot(debian):
     (debian / HOME / "robot0.toml").write_text(CONFIG)
     as_robot(debian, "keygen", *KEYGEN, "--out", f"/{HOME}/robot0.key")
     yield debian
-    as_root(debian, "dpkg", "--purge", "mtm-onboard")
+    if (debian / "usr/bin/mtm-onboard").exists():
+        as_root(debian, "dpkg", "--purge", "mtm-onboard")
 
 
 def as_root(debian: Path, *command: str) -> str:
