@@ -1,5 +1,7 @@
 import os
 import threading
+import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -122,6 +124,12 @@ def test_the_configuration_may_ask_for_it():
     asked = config_from_table(table(priority=40, lock_memory=True, cpu=3)).realtime
     assert asked == RealtimeSettings(40, True, 3)
     assert config_from_table(table()).realtime == RealtimeSettings()
+
+
+def test_the_documented_section_is_one_that_can_be_asked_for():
+    text = (Path(__file__).parents[2] / "docs" / "robot.example.toml").read_text(encoding="utf-8")
+    section = "\n".join(line.removeprefix("# ") for line in text.partition("# [realtime]")[2].splitlines()[1:])
+    assert config_from_table(table(**tomllib.loads(section))).realtime == RealtimeSettings(40, True, 3)
 
 
 @pytest.mark.parametrize(
