@@ -5,6 +5,7 @@ The gains are found by expectation-maximisation from several rotations and mirro
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,23 +17,73 @@ from mtm_audit.tracks import Bools, Floats
 _FIRST_ROUNDS = 2
 _LAST_ROUNDS = 3
 _KEPT = 32
+# Hypotheses times windows of one computation; each takes about a kilobyte.
+_MOST_TOGETHER = 32_768
 
 
-def coherent_evidence(heard: Heard, tones: Sequence[Tones], lags: Floats, inside: Bools, step_s: float) -> Floats:
-    """Log evidence of each hypothesis, (hypotheses,).
+@dataclass(frozen=True)
+class Question:
+    """Timings whose evidence one codebook is asked for.
 
-    `lags` (hypotheses, windows): where each window begins, in cells of `heard` and fractions of them; `inside` which
-    of them count. `tones` holds one array (M, axes, 2 K) for each window, or a single one that serves all.
+    `tones` holds one array (M, axes, 2 K) for each window, or a single one that serves all; `lags` (hypotheses,
+    windows): where each window begins, in cells of what was heard and fractions of them; `inside` which of them count.
     """
-    information, count = _information(heard, tones, lags, step_s)
-    whole = np.clip(np.rint(lags).astype(np.int64), 0, heard.seen.shape[1] - 1)
-    energy = heard.seen[:, whole].transpose(1, 2, 0)[..., None] * template_power(tones[0], heard)
-    observed, axes = energy.shape[2:]
-    visible = inside[..., None]
-    # Every pair of an observed and an injected axis has a gain: (hypotheses, windows, pairs).
-    pairs: Floats = (energy.reshape(*lags.shape, observed * axes) * visible).astype(np.float32)
+
+    tones: Sequence[Tones]
+    lags: Floats
+    inside: Bools
+
+
+def coherent_evidence(heard: Heard, questions: Sequence[Question], step_s: float) -> list[Floats]:
+    """Log evidence of each question's hypotheses, (hypotheses,) each.
+
+    Many codebooks are asked about few timings, so questions are answered together as far as memory allows.
+    """
+    answers: list[Floats] = [np.empty(0)] * len(questions)
+    by_windows: dict[int, list[int]] = {}
+    for number, question in enumerate(questions):
+        by_windows.setdefault(question.lags.shape[1], []).append(number)
+    for windows, numbers in by_windows.items():
+        most = max(1, _MOST_TOGETHER // max(1, windows))
+        sizes = np.cumsum([len(questions[number].lags) for number in numbers])
+        for batch in np.split(np.array(numbers), np.flatnonzero(np.diff(sizes // most)) + 1):
+            asked = [questions[number] for number in batch]
+            found = np.split(_answer(heard, asked, step_s), np.cumsum([len(each.lags) for each in asked])[:-1])
+            for number, evidence in zip(batch, found, strict=True):
+                answers[number] = evidence
+    return answers
+
+
+@dataclass(frozen=True)
+class _Shifted:
+    """What was heard at given lags: `columns` (windows, 2 K, hypotheses x observed axes), `seen` (hypotheses, windows,
+    observed axes).
+    """
+
+    columns: NDArray[np.float32]
+    seen: Floats
+
+
+def _answer(heard: Heard, questions: Sequence[Question], step_s: float) -> Floats:
+    """Evidence of all questions' hypotheses, one after the other."""
+    axes, observed = questions[0].tones[0].shape[1], len(heard.projections)
+    informations, energies = [], []
+    # Codebooks that are asked about the same timings share what was heard there.
+    places: dict[int, _Shifted] = {}
+    for question in questions:
+        if id(question.lags) not in places:
+            places[id(question.lags)] = _shifted(heard, question.lags, step_s)
+        place = places[id(question.lags)]
+        informations.append(_information(place, question.tones))
+        energy = place.seen[..., None] * template_power(question.tones[0], heard)
+        # Every pair of an observed and an injected axis has a gain: (hypotheses, windows, pairs).
+        energies.append(energy.reshape(*question.lags.shape, observed * axes))
+    count = len(questions[0].tones[0])
+    visible = np.concatenate([question.inside for question in questions])[..., None]
+    pairs: Floats = (np.concatenate(energies) * visible).astype(np.float32)
+    information = np.concatenate(informations)
     information *= visible[..., None]
-    gains = np.repeat(_starting_gains(observed, axes)[None], len(lags), axis=0)
+    gains = np.repeat(_starting_gains(observed, axes)[None], len(information), axis=0)
     for _ in range(_FIRST_ROUNDS):
         gains = _better_gains(information, pairs, gains, count)
     fits = _fit(information, pairs, gains, count, visible)
@@ -43,29 +94,34 @@ def coherent_evidence(heard: Heard, tones: Sequence[Tones], lags: Floats, inside
     return np.asarray(_fit(information, pairs, gains, count, visible)[:, 0] - spent)
 
 
-def _information(heard: Heard, tones: Sequence[Tones], lags: Floats, step_s: float) -> tuple[Floats, int]:
-    """Correlations of the best candidates, (hypotheses, windows, kept, pairs of axes), and M."""
-    count, axes, width = tones[0].shape
-    observed = len(heard.projections)
+def _shifted(heard: Heard, lags: Floats, step_s: float) -> _Shifted:
+    """What was heard at `lags` (hypotheses, windows), whole cells and the fraction of one by phase."""
     whole = np.clip(np.rint(lags).astype(np.int64), 0, heard.seen.shape[1] - 1)
     turn = np.exp(-2j * np.pi * heard.tones_hz[:, None, None] * (lags - whole) * step_s)
-    tone_count = width // 2
+    tone_count = len(heard.tones_hz)
     complex_heard = heard.projections[:, :tone_count] + 1j * heard.projections[:, tone_count:]
-    shifted = complex_heard[:, :, whole] * turn
-    parts = np.concatenate([shifted.real, shifted.imag], axis=1).astype(np.float32)
+    turned = complex_heard[:, :, whole] * turn
+    parts = np.concatenate([turned.real, turned.imag], axis=1).astype(np.float32)
+    columns = np.ascontiguousarray(parts.transpose(3, 1, 2, 0)).reshape(lags.shape[1], 2 * tone_count, -1)
+    return _Shifted(columns, heard.seen[:, whole].transpose(1, 2, 0))
+
+
+def _information(place: _Shifted, tones: Sequence[Tones]) -> NDArray[np.float32]:
+    """Correlations of the best candidates, (hypotheses, windows, kept, pairs of axes)."""
+    count, axes, width = tones[0].shape
+    hypotheses, windows, observed = place.seen.shape
     kept = min(count, _KEPT)
-    result: Floats = np.empty((*lags.shape, kept, observed * axes), dtype=np.float32)
-    for window in range(lags.shape[1]):
-        flat = tones[window % len(tones)].reshape(count * axes, width)
-        columns = parts[:, :, :, window].transpose(1, 2, 0).reshape(width, -1)
-        correlated = (flat @ columns).reshape(count, axes, len(lags), observed)
-        values = correlated.transpose(2, 0, 3, 1).reshape(len(lags), count, observed * axes)
+    result = np.empty((hypotheses, windows, kept, observed * axes), dtype=np.float32)
+    for window in range(windows):
+        correlated = tones[window % len(tones)].reshape(count * axes, width) @ place.columns[window]
+        values = correlated.reshape(count, axes, hypotheses, observed).transpose(2, 0, 3, 1)
+        values = values.reshape(hypotheses, count, observed * axes)
         if kept < count:
             strongest = np.argpartition(-np.sum(values**2, axis=2), kept, axis=1)[:, :kept]
             result[:, window] = np.take_along_axis(values, strongest[:, :, None], axis=1)
         else:
             result[:, window] = values
-    return result, count
+    return result
 
 
 def _starting_gains(observed: int, axes: int) -> NDArray[np.float32]:

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mtm_audit.detectors.matched.coherent import coherent_evidence
-from mtm_audit.detectors.matched.correlate import Heard, Prepared, Tones, hear, stacked_tones
+from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
+from mtm_audit.detectors.matched.correlate import Prepared, Tones, hear, stacked_tones
 from mtm_audit.detectors.matched.hypotheses import log_rate_prior
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.search import Found, candidate_rates, lead_cells, waveform_sets
@@ -107,18 +107,25 @@ def _weigh(
     result: list[Floats] = [np.empty((len(nears), len(nears[0].rates_hz))) for nears in offered]
     for coarse_hz in sorted({near.coarse_hz for nears in offered for near in nears}):
         heard = hear(member.prepared, codebooks[0], channel, coarse_hz, lead)
-        for number, nears in enumerate(offered):
-            for row, near in enumerate(nears):
-                if near.coarse_hz == coarse_hz:
-                    evidence = _evidence(heard, motion, tones[number], near, ticks, lead, from_onset=from_onset)
-                    result[number][row] = evidence
+        places = [
+            (number, row)
+            for number, nears in enumerate(offered)
+            for row, near in enumerate(nears)
+            if near.coarse_hz == coarse_hz
+        ]
+        questions = [
+            _question(motion, tones[number], offered[number][row], ticks, lead, from_onset=from_onset)
+            for number, row in places
+        ]
+        for (number, row), evidence in zip(places, coherent_evidence(heard, questions, motion.step_s), strict=True):
+            result[number][row] = evidence
     return result
 
 
-def _evidence(
-    heard: Heard, motion: Motion, tones: Sequence[Tones], near: _Near, ticks: int, lead: int, *, from_onset: bool
-) -> Floats:
-    """Log evidence of the timings; windows before the onset count where the message may have begun earlier."""
+def _question(
+    motion: Motion, tones: Sequence[Tones], near: _Near, ticks: int, lead: int, *, from_onset: bool
+) -> Question:
+    """The timings' evidence; windows before the onset count where the message may have begun earlier."""
     lengths_s = ticks / near.rates_hz
     available = len(motion.seen) + lead
     before = (motion.start_s - lead * motion.step_s - near.onsets_s) / lengths_s
@@ -126,7 +133,7 @@ def _evidence(
     last = int(np.ceil((before + available * motion.step_s / lengths_s).max()))
     numbers = np.arange(len(tones)) if len(tones) > 1 else np.arange(first, max(first, last) + 1)
     lags = (near.onsets_s[:, None] + numbers * lengths_s[:, None] - motion.start_s) / motion.step_s + lead
-    return coherent_evidence(heard, tones, lags, (lags >= 0) & (lags <= available - 1), motion.step_s)
+    return Question(tones, lags, (lags >= 0) & (lags <= available - 1))
 
 
 def _fleet_timing(

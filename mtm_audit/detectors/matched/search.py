@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mtm_audit.detectors.matched.coherent import coherent_evidence
+from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
 from mtm_audit.detectors.matched.correlate import Heard, Prepared, Tones, evidence_by_lag, hear, stacked_tones
 from mtm_audit.detectors.matched.hypotheses import Grid, Hypothesis, fold, make_grid
 from mtm_audit.detectors.matched.motion import Motion
@@ -116,15 +116,17 @@ def _rates_at_known_onset(
     place: _Place, rates: int, tones: Sequence[Sequence[Tones]], motion: Motion, lead: int, report: _Report
 ) -> list[Found]:
     """Only the rate is open, so that every fine rate can be weighed with one set of gains."""
-    best: list[Found | None] = [None] * len(tones)
+    best: list[Found] = []
     for coarse in range(rates):
         report(coarse / rates)
         heard, grid = place(coarse)
-        for number, numbered in enumerate(tones):
-            found = _surroundings(heard, grid, numbered, 0, motion, lead, onset_known=True)
-            known = best[number]
-            best[number] = found if known is None or found.evidence > known.evidence else known
-    return [found for found in best if found is not None]
+        found = _surroundings(heard, grid, tones, [0] * len(tones), motion, lead, onset_known=True)
+        best = found if not best else [max(pair, key=_found_evidence) for pair in zip(best, found, strict=True)]
+    return best
+
+
+def _found_evidence(found: Found) -> float:
+    return found.evidence
 
 
 def _onsets_and_rates(
@@ -141,19 +143,20 @@ def _onsets_and_rates(
     best = [(-np.inf, found[0]) for found in chosen]
     for coarse in sorted({item.coarse for found in chosen for item in found}):
         heard, grid = place(coarse)
-        for number, numbered in enumerate(tones):
-            here = [item for item in chosen[number] if item.coarse == coarse]
-            if here:
-                best[number] = max(best[number], _weigh(heard, grid, numbered, here, motion.step_s), key=_evidence)
+        here = [[item for item in found if item.coarse == coarse] for found in chosen]
+        numbers = [number for number, items in enumerate(here) if items]
+        weighed = _weigh(heard, grid, [tones[number] for number in numbers], [here[n] for n in numbers], motion.step_s)
+        for number, winner in zip(numbers, weighed, strict=True):
+            best[number] = max(best[number], winner, key=_evidence)
     found_at: dict[int, Found] = {}
     winning = sorted({winner.coarse for _, winner in best})
     for done, coarse in enumerate(winning):
         report(0.5 + 0.5 * done / len(winning))
         heard, grid = place(coarse)
-        for number, (_, winner) in enumerate(best):
-            if winner.coarse == coarse:
-                start = winner.hypothesis.start
-                found_at[number] = _surroundings(heard, grid, tones[number], start, motion, lead, onset_known=False)
+        numbers = [number for number, (_, winner) in enumerate(best) if winner.coarse == coarse]
+        starts = [best[number][1].hypothesis.start for number in numbers]
+        near = _surroundings(heard, grid, [tones[n] for n in numbers], starts, motion, lead, onset_known=False)
+        found_at.update(zip(numbers, near, strict=True))
     return [found_at[number] for number in range(len(best))]
 
 
@@ -162,27 +165,49 @@ def _evidence(weighed: tuple[float, _Candidate]) -> float:
 
 
 def _weigh(
-    heard: Heard, grid: Grid, tones: Sequence[Tones], candidates: Sequence[_Candidate], step_s: float
-) -> tuple[float, _Candidate]:
-    """The best of some hypotheses of one grid, with its coherent evidence."""
-    rates = np.array([item.hypothesis.rate for item in candidates])
-    starts = np.array([item.hypothesis.start for item in candidates])
-    evidence = coherent_evidence(heard, tones, grid.lags[rates, starts], grid.inside[rates, starts], step_s)
-    evidence = evidence + grid.prior[rates]
-    winner = int(np.argmax(evidence))
-    return float(evidence[winner]), candidates[winner]
+    heard: Heard,
+    grid: Grid,
+    tones: Sequence[Sequence[Tones]],
+    candidates: Sequence[Sequence[_Candidate]],
+    step_s: float,
+) -> list[tuple[float, _Candidate]]:
+    """For each codebook the best of its hypotheses of one grid, with its coherent evidence."""
+    rates = [np.array([item.hypothesis.rate for item in items]) for items in candidates]
+    starts = [np.array([item.hypothesis.start for item in items]) for items in candidates]
+    questions = [
+        Question(numbered, grid.lags[rate, start], grid.inside[rate, start])
+        for numbered, rate, start in zip(tones, rates, starts, strict=True)
+    ]
+    result = []
+    for evidence, rate, items in zip(coherent_evidence(heard, questions, step_s), rates, candidates, strict=True):
+        weighed = evidence + grid.prior[rate]
+        winner = int(np.argmax(weighed))
+        result.append((float(weighed[winner]), items[winner]))
+    return result
 
 
 def _surroundings(
-    heard: Heard, grid: Grid, tones: Sequence[Tones], start: int, motion: Motion, lead: int, *, onset_known: bool
-) -> Found:
-    """The best timing around one start: all fine rates of its grid, onsets in half cells unless it is known."""
+    heard: Heard,
+    grid: Grid,
+    tones: Sequence[Sequence[Tones]],
+    starts: Sequence[int],
+    motion: Motion,
+    lead: int,
+    *,
+    onset_known: bool,
+) -> list[Found]:
+    """For each codebook the best timing around its start: all fine rates of the grid, onsets in half cells or known."""
     shifts = np.zeros(1) if onset_known else _HALF_CELLS
-    lags = grid.lags[:, start][:, None, :] + shifts[None, :, None]
-    inside = np.broadcast_to(grid.inside[:, start][:, None, :], lags.shape)
-    count = lags.shape[0] * lags.shape[1]
-    evidence = coherent_evidence(heard, tones, lags.reshape(count, -1), inside.reshape(count, -1), motion.step_s)
-    evidence = evidence.reshape(lags.shape[:2]) + grid.prior[:, None]
-    rate, shift = np.unravel_index(np.argmax(evidence), evidence.shape)
-    onset_s = motion.start_s + (float(grid.starts[start] + shifts[shift]) - lead) * motion.step_s
-    return Found(Timing(onset_s, float(grid.rates_hz[rate])), float(evidence[rate, shift]))
+    around = {}
+    for start in set(starts):
+        lags = grid.lags[:, start][:, None, :] + shifts[None, :, None]
+        inside = np.broadcast_to(grid.inside[:, start][:, None, :], lags.shape)
+        around[start] = (lags.reshape(-1, lags.shape[2]), inside.reshape(-1, lags.shape[2]))
+    questions = [Question(numbered, *around[start]) for numbered, start in zip(tones, starts, strict=True)]
+    result = []
+    for answer, start in zip(coherent_evidence(heard, questions, motion.step_s), starts, strict=True):
+        evidence = answer.reshape(-1, len(shifts)) + grid.prior[:, None]
+        rate, shift = np.unravel_index(np.argmax(evidence), evidence.shape)
+        onset_s = motion.start_s + (float(grid.starts[start] + shifts[shift]) - lead) * motion.step_s
+        result.append(Found(Timing(onset_s, float(grid.rates_hz[rate])), float(evidence[rate, shift])))
+    return result
