@@ -51,6 +51,14 @@ class Plan:
 
 
 @dataclass(frozen=True)
+class Ends:
+    """Where base commands come from and where commands go, when the caller has both already."""
+
+    source: Source
+    transport: Transport
+
+
+@dataclass(frozen=True)
 class Outcome:
     """What the run did. `journal` is None when none was kept."""
 
@@ -72,9 +80,12 @@ class Outcome:
         )
 
 
-def run_session(config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callable[[], bool]) -> Outcome:
+def run_session(
+    config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callable[[], bool], ends: Ends | None = None
+) -> Outcome:
     """Drive the robot until `asked_to_end()` or the plan's end; leaving it, in whatever way, stops the robot.
 
+    `ends`, when given, take the place of the source and the transport that the configuration names.
     Raises MtmError when the plan does not fit the key, when the link, the control socket or the journal cannot be had,
     and when the link fails.
     """
@@ -86,10 +97,10 @@ def run_session(config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callabl
         _check_clock(time.time())
     guard = Guard(config.limits, config.staleness, noise_sigma=channel.sigma, period_s=1 / rate_hz)
     clock, stats = SystemClock(), LoopStats()
-    transport = _link(config, clock)
+    transport = _link(config, clock) if ends is None else ends.transport
     # The stack closes in reverse: the robot is told to stop before a socket or a slow disk is waited for.
     with ExitStack() as stack:
-        source = _source(config.source)
+        source = _source(config.source) if ends is None else ends.source
         stack.callback(source.close)
         files = stack.enter_context(ExitStack())
         socket = None if config.control is None else files.enter_context(ControlSocket(Path(config.control.socket)))

@@ -2,14 +2,9 @@
 
 import argparse
 import math
-import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from mtm_onboard.commands.contentoptions import add_content, content
-
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -39,6 +34,7 @@ def _run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from mtm_onboard.config import SourceSettings, load_config
+    from mtm_onboard.endingsignals import ending_signals
     from mtm_onboard.protocol import load_key
     from mtm_onboard.session import Plan, run_session
 
@@ -46,27 +42,10 @@ def _run(args: argparse.Namespace) -> int:
     if args.stdin:
         config = replace(config, source=SourceSettings("stdin"))
     plan = Plan(None if args.no_message else content(args), not args.no_repeat, args.start_at, args.duration)
-    with _ending_signals() as asked_to_end:
+    with ending_signals() as asked_to_end:
         outcome = run_session(config, key, plan, asked_to_end)
     print(outcome.summary())
     return 0
-
-
-@contextmanager
-def _ending_signals() -> Iterator[Callable[[], bool]]:
-    """Yield a question that is true once the process was asked to end; the former handlers come back after it."""
-    asked = False
-
-    def ask(*_: object) -> None:
-        nonlocal asked
-        asked = True
-
-    former = {number: signal.signal(number, ask) for number in _SIGNALS}
-    try:
-        yield lambda: asked
-    finally:
-        for number, handler in former.items():
-            signal.signal(number, handler)
 
 
 def _seconds(text: str) -> float:

@@ -47,7 +47,8 @@ def test_the_same_policy_with_random_noise_does_as_well_and_says_nothing(example
     assert clipped_share < 0.05
 
 
-def test_the_script_leaves_a_recording_and_its_key(example, tmp_path, capsys):
+def test_the_script_leaves_a_recording_and_its_key(example, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(example, "generate_key", lambda key_id, scheme: Key(key_id, FAKE_SECRET, scheme))
     out = tmp_path / "policy"
     assert example.main(["--message", "178", "--out", str(out)]) == 0
     decoded = decode_tracks([read_csv(out / "point.csv")], load_key(out / "point.key"), KNOWN)

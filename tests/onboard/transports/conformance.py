@@ -13,7 +13,7 @@ import pytest
 
 from hil.clock import SimulatedClock
 from hil.robots.motion_controller import MotionController
-from mtm_onboard.commands.run import _ending_signals
+from mtm_onboard.endingsignals import ending_signals
 from mtm_onboard.motion import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.transports.base import Transport
@@ -177,7 +177,7 @@ class TransportConformance:
             assert rig.plant.velocity_body == self.other
 
     def test_a_request_to_terminate_stops_the_robot(self, rig):
-        with _ending_signals() as asked_to_end, rig.transport:
+        with ending_signals() as asked_to_end, rig.transport:
             driven = Driven(rig.transport, rig.clock)
             driven.run(0.2, self.askew)
             assert rig.plant.velocity_body != STOP
