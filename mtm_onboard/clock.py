@@ -4,7 +4,7 @@ import ctypes
 import errno
 import math
 import time
-from typing import Protocol
+from typing import Any, Protocol
 
 
 class Clock(Protocol):
@@ -23,7 +23,7 @@ class Clock(Protocol):
 _CLOCK = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
 _TIMER_ABSTIME = 1
 # None where the C library has no such call.
-_CLOCK_NANOSLEEP = getattr(ctypes.CDLL(None), "clock_nanosleep", None)
+_CLOCK_NANOSLEEP: Any = getattr(ctypes.CDLL(None), "clock_nanosleep", None)
 
 
 class _Timespec(ctypes.Structure):
@@ -43,10 +43,12 @@ class SystemClock:
         `time.sleep` waits for what remains, and a thread that loses its processor after reckoning that, before it
         sleeps, would wake so much later.
         """
+        if self.now() >= deadline_s:
+            return
+        answer = None if _CLOCK_NANOSLEEP is None else errno.EINTR
         instant = _Timespec(*divmod(math.ceil(deadline_s * 1e9), 10**9))
-        while (remaining_s := deadline_s - self.now()) > 0:
-            if _CLOCK_NANOSLEEP is None or _CLOCK_NANOSLEEP(
-                _CLOCK, _TIMER_ABSTIME, ctypes.byref(instant), None
-            ) not in (0, errno.EINTR):
-                # Some other system's, or one that knows no such wait on this clock.
-                time.sleep(remaining_s)
+        while answer == errno.EINTR:
+            answer = _CLOCK_NANOSLEEP(_CLOCK, _TIMER_ABSTIME, ctypes.byref(instant), None)
+        if answer != 0:
+            # There is no such call, or it knows no such wait on this clock.
+            time.sleep(max(0.0, deadline_s - self.now()))
