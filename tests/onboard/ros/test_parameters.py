@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from mtm_onboard.guard import Limits, Staleness
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.ros.parameters import DEFAULTS, config_of, key_path, plan_of
 
+PAGE = (Path(__file__).parents[3] / "docs" / "policies-and-ros2.md").read_text()
 GIVEN = DEFAULTS | {"key": "/etc/mtm/r.key", "channel": "a", "speed_mps": 1, "turn_rate_radps": 2.5}
 
 
@@ -64,3 +66,11 @@ def test_a_value_that_no_configuration_may_have_is_refused(changes, says):
 def test_without_a_key_file_there_is_nothing_to_run(key):
     with pytest.raises(MtmError, match="names no file"):
         key_path(GIVEN | {"key": key})
+
+
+def test_the_documented_parameters_are_those_there_are():
+    rows = [line for line in PAGE.splitlines() if line.startswith("| `")]
+    named = {name for row in rows for name in re.findall(r"`([^`]+)`", row.split("|")[1])}
+    assert named == DEFAULTS.keys() | {"cmd_vel", "cmd_vel_out", "~/stop"}
+    for name in ("noise_off_s", "stopped_s"):
+        assert f"`{name}` ({DEFAULTS[name]})" in PAGE
