@@ -66,7 +66,7 @@ def _table(summary: JournalSummary) -> Table:
 
 def _message(header: JournalHeader) -> str:
     if header.symbols is None:
-        return "none, base commands alone"
+        return "none at first"
     return f"symbols {','.join(map(str, header.symbols))}, {'repeated' if header.repeat else 'once'}"
 
 
