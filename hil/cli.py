@@ -210,6 +210,52 @@ def sweep(
         run(options, console)
 
 
+@app.command()
+def faults(
+    seeds: Annotated[int, typer.Option("-n", min=1, help="Runs of each cell of the matrix.")] = 3,
+    seed: Annotated[int, typer.Option(min=0, help="The first run's seed.")] = 0,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
+    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
+    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/faults.jsonl"),
+) -> None:
+    """Run a robot under every fault of its wire, alone and with a lost link: stops, stale commands, the message."""
+    with _reported() as console:
+        from hil.commands.faults import faults as run
+
+        if not run(seeds, seed, workers, out, cells, console):
+            raise typer.Exit(1)
+
+
+@app.command()
+def fuzz(
+    inputs: Annotated[int, typer.Option("-n", min=1, help="Inputs, over all ends of all wires.")] = 1_000_000,
+    seed: Annotated[int, typer.Option(min=0, help="The first cell's seed.")] = 0,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
+    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
+    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/fuzz.jsonl"),
+) -> None:
+    """Feed damaged traffic to the transports and the simulated robots, and see what they take for sound."""
+    with _reported() as console:
+        from hil.commands.fuzz import fuzz as run
+
+        if not run(inputs, seed, workers, out, cells, console):
+            raise typer.Exit(1)
+
+
+@app.command()
+def endurance(
+    hours: Annotated[float, typer.Option(min=0.0, help="Simulated hours.")] = 24.0,
+    checkpoints: Annotated[int, typer.Option(min=1, help="How often to look, evenly spaced and at the end.")] = 24,
+    seed: Annotated[int, typer.Option(min=0, help="Decides where the robot goes and how its wheels slip.")] = 0,
+    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
+) -> None:
+    """Run one robot for a day in simulated time: memory, journal, ticks, and the message in each last minute."""
+    with _reported() as console:
+        from hil.commands.endurance import endurance as run
+
+        run(hours, checkpoints, seed, out, console)
+
+
 paper = typer.Typer(help="The paper's tables, measured on the simulated robots.", no_args_is_help=True)
 app.add_typer(paper, name="paper")
 

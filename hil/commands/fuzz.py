@@ -1,0 +1,52 @@
+"""`mtm-hil fuzz`: damaged traffic into every end of every wire."""
+
+import csv
+from pathlib import Path
+
+from rich.console import Console
+
+from hil.experiments.cells import CellStore
+from hil.experiments.fuzz import COUNTS, Summary, fuzz_cell, fuzz_cells, summarise
+from hil.experiments.fuzz_targets import TARGETS
+from hil.experiments.sweep import run_sweep
+from mtm_onboard.protocol.atomicfile import replacing
+
+
+def fuzz(inputs: int, seed: int, workers: int | None, out: Path | None, cells: Path, console: Console) -> bool:
+    """Fuzz, print and, where asked, write what came of it; False when something crashed, was deaf or made things up."""
+    asked = fuzz_cells(inputs, seed)
+    with CellStore(cells) as store:
+        results = run_sweep(fuzz_cell, asked, store, console, workers)
+    summaries = [
+        summarise(
+            name, [result for cell, result in zip(asked, results, strict=True) if cell.parameters["target"] == name]
+        )
+        for name in TARGETS
+    ]
+    for one in summaries:
+        print(_sentence(one))
+        for failure in one.failures[:1]:
+            print(failure)
+    if out is not None:
+        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+            file.write(f"# mtm-hil fuzz -n {inputs} --seed {seed} --out {out}\n")
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(("target", *COUNTS, "most_altered_expected", "longest_ms"))
+            writer.writerows(_row(one) for one in summaries)
+        print(f"wrote {out}")
+    return not any(one.counts[name] for one in summaries for name in ("unsent", "crashes", "deaf"))
+
+
+def _sentence(one: Summary) -> str:
+    expected = "text has no checksum" if one.most_altered is None else f"at most {one.most_altered:.2g} expected"
+    counts = one.counts
+    return (
+        f"{one.target}: {counts['inputs']} inputs, {counts['crashes']} crashes, deaf after {counts['deaf']}, "
+        f"{counts['whole']} whole messages understood, {counts['altered']} altered ({expected}), {counts['unsent']} "
+        f"that never came; at most {one.longest_ms:.1f} ms an input"
+    )
+
+
+def _row(one: Summary) -> tuple[object, ...]:
+    expected = "" if one.most_altered is None else f"{one.most_altered:.3g}"
+    return (one.target, *(one.counts[name] for name in COUNTS), expected, one.longest_ms)
