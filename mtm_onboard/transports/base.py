@@ -23,7 +23,8 @@ class Transport(ABC):
     A subclass implements `open`, `send`, `stop` and `close`. `send` refuses non-finite velocities with ValueError
     before anything is packed. `service` does what the link needs between commands (heartbeats, telemetry); the
     runtime calls it at least every `service_period_s`, on the robot from a thread of its own, so a subclass guards
-    whole messages with a lock. `write_bound_s` is the longest that `send` may wait for the far end.
+    whole messages with a lock. `write_bound_s` is the longest that `send` may wait for the far end. `has_deadman` says
+    whether the robot stops by itself when no commands come; one that does not goes on until the link is back.
 
     For a link that may go and come back: `up_since_s` is when it came up last on the runtime's clock (-inf for a link
     that is up from `open` to `stop`, None while it is down), `dropped` counts commands that `send` took without an
@@ -32,6 +33,7 @@ class Transport(ABC):
 
     service_period_s: float = 0.010
     write_bound_s: float = 0.005
+    has_deadman: bool = True
     up_since_s: float | None = -math.inf
     dropped: int = 0
     fault: str = ""

@@ -12,6 +12,8 @@ from mtm_onboard.transports.base import LinkBusyError, TakenOverError, Transport
 
 _FIRST_PAUSE_S = 0.1
 _LONGEST_PAUSE_S = 5.0
+# Where the robot drives on until it is told to stop.
+_LONGEST_PAUSE_WITHOUT_DEADMAN_S = 0.5
 # A tenth of a second at 50 Hz: a host that stalls for a moment is no lost link, and a line that stays full is one.
 _MOST_BUSY = 5
 _LONGEST_PERIOD_S = 0.05
@@ -24,9 +26,10 @@ class ReconnectingTransport(Transport):
 
     A `send` or `service` that fails takes the link down, as do several `LinkBusyError` in a row. While it is down,
     `send` returns at once, counted in `dropped`; `service` tells the robot to stop, releases the old link, and tries
-    to open a new one after 0.1 s, then after pauses that double up to 5 s. Only `service` waits for any of that.
-    After `give_up_s` without a link that holds `send` raises MtmError. A robot that somebody else has taken over is no
-    lost link: TakenOverError goes to whoever called.
+    to open a new one after 0.1 s, then after pauses that double up to 5 s, or up to 0.5 s where the robot has no
+    deadman and drives on until then. Only `service` waits for any of that. After `give_up_s` without a link that holds
+    `send` raises MtmError. A robot that somebody else has taken over is no lost link: TakenOverError goes to whoever
+    called.
 
     That nothing moves before a base command has come over the new link is the runtime's part, see `up_since_s`.
     """
@@ -48,6 +51,7 @@ class ReconnectingTransport(Transport):
         self._pause_s = _FIRST_PAUSE_S
         self.service_period_s = min(_LONGEST_PERIOD_S, self._link.service_period_s)
         self.write_bound_s = self._link.write_bound_s
+        self.has_deadman = self._link.has_deadman
 
     def health(self) -> dict[str, int | float | str | bool]:
         """Of this wrapper and, beside it, of the link in use."""
@@ -156,7 +160,7 @@ class ReconnectingTransport(Transport):
                 self._out_since_s = now_s
                 self._pause_s = _FIRST_PAUSE_S
             else:
-                self._pause_s = _longer(self._pause_s)
+                self._lengthen_pause()
             self._next_try_s = now_s + self._pause_s
             self.up_since_s = None
 
@@ -184,7 +188,7 @@ class ReconnectingTransport(Transport):
             if isinstance(error, TakenOverError):
                 raise
             self.fault = str(error)
-            self._pause_s = _longer(self._pause_s)
+            self._lengthen_pause()
             self._next_try_s = self._clock.now() + self._pause_s
             return
         with self._lock:
@@ -203,6 +207,6 @@ class ReconnectingTransport(Transport):
         if down_s >= self._give_up_s:
             raise MtmError(f"the link has been down for {down_s:.0f} s ({self.fault}); check the cable and the robot")
 
-
-def _longer(pause_s: float) -> float:
-    return min(2.0 * pause_s, _LONGEST_PAUSE_S)
+    def _lengthen_pause(self) -> None:
+        longest_s = _LONGEST_PAUSE_S if self.has_deadman else _LONGEST_PAUSE_WITHOUT_DEADMAN_S
+        self._pause_s = min(2.0 * self._pause_s, longest_s)

@@ -58,6 +58,8 @@ class RoboMasterPlaintext(Transport):
     have meant, `link_errors` reads and writes that failed.
     """
 
+    has_deadman = False
+
     def __init__(self) -> None:
         self.answers = 0
         self.refusals = 0

@@ -49,6 +49,7 @@ class Bench:
         self.service_error: Exception | None = None
         self.is_absent = False
         self.is_taken_over = False
+        self.has_deadman = True
         self.events: list[tuple[float, str]] = []
         self.commands: list[BodyVelocity] = []
 
@@ -68,6 +69,7 @@ class BenchLink(NullTransport):
     def __init__(self, bench: Bench) -> None:
         super().__init__()
         self.bench = bench
+        self.has_deadman = bench.has_deadman
 
     def _happens(self, name: str) -> None:
         self.bench.events.append((self.bench.clock.now(), name))
@@ -117,6 +119,19 @@ def test_while_the_link_is_down_ticks_go_on_and_openings_are_tried_ever_more_rar
     assert link.fault == "no such port"
     pauses_s = np.diff([0.1, *bench.times_s("open")[1:]])
     assert pauses_s == pytest.approx([0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5.0, 5.0], abs=0.011)
+
+
+def test_a_robot_without_a_deadman_drives_on_for_half_a_second_at_most_once_it_can_be_reached_again(bench):
+    bench.has_deadman = False
+    link = bench.reconnecting()
+    assert not link.has_deadman
+    link.open()
+    driven = Driven(link, bench.clock)
+    driven.run(0.1, BASE)
+    bench.error, bench.is_absent = OSError("cable pulled"), True
+    driven.run(3.0, BASE)
+    pauses_s = np.diff([0.1, *bench.times_s("open")[1:]])
+    assert pauses_s == pytest.approx([0.1, 0.2, 0.4, 0.5, 0.5, 0.5, 0.5], abs=0.011)
 
 
 @pytest.mark.parametrize("where", ["error", "service_error"])
