@@ -45,9 +45,8 @@ LATE_S = 0.1
 
 _SYMBOLS = (3, 1)
 _WINDOW_TICKS = 200
-_DECOYS = 30
 _SAME = 2e-4  # what plaintext rounds off, in m/s and rad/s, and a hair
-_MOSTLY = 0.9
+_MOSTLY = 0.75
 
 
 @dataclass(frozen=True)
@@ -57,8 +56,9 @@ class Outcome:
     `altered` commands came into force that were never sent. `arrived_s` is the age of the oldest command with which
     motion began, `held_s` the greatest age that a command in force reached. `lost_stop_s` is from the loss of the link
     to the stop, -1 when the robot did not stop before the wire was whole again and 0 when there was no loss.
-    `silent_stop_s` is from the last base command to the last stop. Of `windows` of the message the runtime says it has
-    sent `sent`; `message_is_due` when these hold every symbol, and `is_decoded` when it was decoded, and right.
+    `silent_stop_s` is from the last base command to the last stop.
+    Of `windows` of the message `sent` have left the runtime for the most part, within what the robot can do;
+    `message_is_due` when these hold every symbol, and `is_decoded` when it was decoded, and right.
     """
 
     altered: int
@@ -128,7 +128,7 @@ def fault_cell(parameters: Values, seed: int) -> dict[str, Scalar]:
             str(parameters["wire"]), FAULTS[str(parameters["fault"])], str(parameters["loss"]), key, _SYMBOLS, seed,
             Path(folder),
         )  # fmt: skip
-    return assess(run, bool(parameters["loss"])) | _decoded(run, key, draw)
+    return assess(run, bool(parameters["loss"]), FAULTS[str(parameters["fault"])].most) | _decoded(run, key, draw)
 
 
 def line_of(cell: Cell, result: Values) -> Line:
@@ -143,8 +143,8 @@ def line_of(cell: Cell, result: Values) -> Line:
     )  # fmt: skip
 
 
-def assess(run: FaultRun, is_lost: bool) -> dict[str, Scalar]:
-    """What the robot did, beside what the journal says it was told."""
+def assess(run: FaultRun, is_lost: bool, most: float = np.inf) -> dict[str, Scalar]:
+    """What the robot did, beside what the journal says it was told; it cannot do more than `most` on any axis."""
     altered, arrived_s, held_s = 0, 0.0, 0.0
     ends_s = [when_s for when_s, _ in run.in_force[1:]] + [END_S]
     for (when_s, velocity), end_s in zip(run.in_force, ends_s, strict=True):
@@ -159,7 +159,7 @@ def assess(run: FaultRun, is_lost: bool) -> dict[str, Scalar]:
     moved_s = max(end_s for (_, velocity), end_s in zip(run.in_force, ends_s, strict=True) if velocity != STOP)
     rate_hz = run.journal.header.rate_hz
     last_base_s = START_S + math.ceil((SILENT_S - START_S) * rate_hz - 1e-6) / rate_hz - 1.0 / rate_hz
-    sent = _windows_sent(run.journal)
+    sent = _windows_sent(run.journal, most)
     return {
         "altered": altered, "arrived_s": round(arrived_s, 4), "held_s": round(held_s, 4),
         "lost_stop_s": round(lost_stop_s, 4), "silent_stop_s": round(moved_s - last_base_s, 4), "losses": run.losses,
@@ -175,11 +175,11 @@ def _sent_s(journal: JournalRecord, velocity: np.ndarray, by_s: float) -> float 
     return float(times_s[same][-1]) if np.any(same) else None
 
 
-def _windows_sent(journal: JournalRecord) -> list[bool]:
-    """For each window of the message until the controller fell silent, whether nearly all of its noise has left."""
+def _windows_sent(journal: JournalRecord, most: float) -> list[bool]:
+    """For each window of the message until the controller fell silent, whether most of it has left and can be done."""
     count = int((SILENT_S - START_S) * journal.header.rate_hz) // _WINDOW_TICKS
     left = np.zeros(count * _WINDOW_TICKS, dtype=np.bool_)
-    with_noise = (journal.flags & (NOISE | UNSENT)) == NOISE
+    with_noise = ((journal.flags & (NOISE | UNSENT)) == NOISE) & np.all(np.abs(journal.sent) <= most, axis=1)
     ticks = journal.ticks[with_noise]
     left[ticks[(ticks >= 0) & (ticks < len(left))]] = True
     return [bool(share >= _MOSTLY) for share in left.reshape(count, _WINDOW_TICKS).mean(axis=1)]
@@ -189,6 +189,6 @@ def _decoded(run: FaultRun, key: Key, draw: np.random.Generator) -> dict[str, Sc
     times_s = np.arange(len(run.motion), dtype=np.float64) * SAMPLE_PERIOD_S
     trajectory = Trajectory("robot0", times_s, run.motion[:, :2], run.motion[:, 2])
     tracks = capture(MotionCapture(), [trajectory], draw, end_s=SILENT_S)
-    decoding = decode_tracks(tracks, key, DecodeSettings("matched", onset_s=START_S, decoys=_DECOYS))
+    decoding = decode_tracks(tracks, key, DecodeSettings("matched", onset_s=START_S))
     is_decoded = decoding.verdict == "decoded" and decoding.symbols == _SYMBOLS
     return {"is_decoded": is_decoded, "p_value": decoding.evidence.p_value}
