@@ -126,6 +126,21 @@ def false_alarms(
 
 
 @app.command()
+def messages(
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Messages of each kind.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="The first rollout's seed.")] = 700_000,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
+    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
+    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/messages.jsonl"),
+) -> None:
+    """Send framed messages and see how many are received, whole, by the clock, and through occlusions."""
+    with _reported() as console:
+        from hil.commands.messages import messages as run
+
+        run(rollouts, seed, workers, out, cells, console)
+
+
+@app.command()
 def frames(
     count: Annotated[int, typer.Option("-n", min=200, help="Frames under noise for each check.")] = 10_000,
     seed: Annotated[int, typer.Option(min=0, help="The first cell's seed.")] = 0,

@@ -19,6 +19,8 @@ _LAST_ROUNDS = 3
 _KEPT = 32
 # Hypotheses times windows of one computation; each takes about a kilobyte.
 _MOST_TOGETHER = 32_768
+# Windows times candidates of one product of matrices.
+_MOST_CORRELATED = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -39,47 +41,60 @@ def coherent_evidence(heard: Heard, questions: Sequence[Question], step_s: float
 
     Many codebooks are asked about few timings, so questions are answered together as far as memory allows.
     """
+    seen: dict[int, _Seen] = {}
+    for question in questions:
+        # Codebooks that are asked about the same timings share what was heard there.
+        if id(question.lags) not in seen:
+            seen[id(question.lags)] = _windows_seen(question)
     answers: list[Floats] = [np.empty(0)] * len(questions)
     by_windows: dict[int, list[int]] = {}
     for number, question in enumerate(questions):
-        by_windows.setdefault(question.lags.shape[1], []).append(number)
+        by_windows.setdefault(seen[id(question.lags)].lags.shape[1], []).append(number)
     for windows, numbers in by_windows.items():
         most = max(1, _MOST_TOGETHER // max(1, windows))
         sizes = np.cumsum([len(questions[number].lags) for number in numbers])
         for batch in np.split(np.array(numbers), np.flatnonzero(np.diff(sizes // most)) + 1):
-            asked = [questions[number] for number in batch]
-            found = np.split(_answer(heard, asked, step_s), np.cumsum([len(each.lags) for each in asked])[:-1])
+            asked = [(questions[number].tones, seen[id(questions[number].lags)]) for number in batch]
+            found = np.split(_answer(heard, asked, step_s), np.cumsum([len(each.lags) for _, each in asked])[:-1])
             for number, evidence in zip(batch, found, strict=True):
                 answers[number] = evidence
     return answers
 
 
 @dataclass(frozen=True)
-class _Shifted:
-    """What was heard at given lags: `columns` (windows, 2 K, hypotheses x observed axes), `seen` (hypotheses, windows,
-    observed axes).
+class _Seen:
+    """The windows of a question that are inside, moved together: each (hypotheses, windows).
+
+    `numbers` says which window of the question each is; where a hypothesis has fewer than others, `inside` is False.
     """
 
-    columns: NDArray[np.float32]
-    seen: Floats
+    lags: Floats
+    numbers: NDArray[np.int64]
+    inside: Bools
 
 
-def _answer(heard: Heard, questions: Sequence[Question], step_s: float) -> Floats:
+def _windows_seen(question: Question) -> _Seen:
+    most = max(1, int(question.inside.sum(axis=1).max(initial=0)))
+    numbers = np.argsort(~question.inside, axis=1, kind="stable")[:, :most]
+    lags = np.take_along_axis(question.lags, numbers, axis=1)
+    return _Seen(lags, numbers, np.take_along_axis(question.inside, numbers, axis=1))
+
+
+def _answer(heard: Heard, asked: Sequence[tuple[Sequence[Tones], _Seen]], step_s: float) -> Floats:
     """Evidence of all questions' hypotheses, one after the other."""
-    axes, observed = questions[0].tones[0].shape[1], len(heard.projections)
+    first = asked[0][0][0]
+    count, axes, observed = len(first), first.shape[1], len(heard.projections)
     informations, energies = [], []
-    # Codebooks that are asked about the same timings share what was heard there.
     places: dict[int, _Shifted] = {}
-    for question in questions:
-        if id(question.lags) not in places:
-            places[id(question.lags)] = _shifted(heard, question.lags, step_s)
-        place = places[id(question.lags)]
-        informations.append(_information(place, question.tones))
-        energy = place.seen[..., None] * template_power(question.tones[0], heard)
+    for tones, seen in asked:
+        if id(seen) not in places:
+            places[id(seen)] = _shifted(heard, seen.lags, step_s)
+        place = places[id(seen)]
+        informations.append(_information(place, seen, tones))
+        energy = place.weights[..., None] * template_power(tones[0], heard)
         # Every pair of an observed and an injected axis has a gain: (hypotheses, windows, pairs).
-        energies.append(energy.reshape(*question.lags.shape, observed * axes))
-    count = len(questions[0].tones[0])
-    visible = np.concatenate([question.inside for question in questions])[..., None]
+        energies.append(energy.reshape(*seen.lags.shape, observed * axes))
+    visible = np.concatenate([seen.inside for _, seen in asked])[..., None]
     pairs: Floats = (np.concatenate(energies) * visible).astype(np.float32)
     information = np.concatenate(informations)
     information *= visible[..., None]
@@ -94,6 +109,16 @@ def _answer(heard: Heard, questions: Sequence[Question], step_s: float) -> Float
     return np.asarray(_fit(information, pairs, gains, count, visible)[:, 0] - spent)
 
 
+@dataclass(frozen=True)
+class _Shifted:
+    """What was heard at given lags: `columns` (hypotheses, windows, observed axes, 2 K), and the `weights` of the cells
+    (hypotheses, windows, observed axes).
+    """
+
+    columns: NDArray[np.float32]
+    weights: Floats
+
+
 def _shifted(heard: Heard, lags: Floats, step_s: float) -> _Shifted:
     """What was heard at `lags` (hypotheses, windows), whole cells and the fraction of one by phase."""
     whole = np.clip(np.rint(lags).astype(np.int64), 0, heard.seen.shape[1] - 1)
@@ -102,25 +127,28 @@ def _shifted(heard: Heard, lags: Floats, step_s: float) -> _Shifted:
     complex_heard = heard.projections[:, :tone_count] + 1j * heard.projections[:, tone_count:]
     turned = complex_heard[:, :, whole] * turn
     parts = np.concatenate([turned.real, turned.imag], axis=1).astype(np.float32)
-    columns = np.ascontiguousarray(parts.transpose(3, 1, 2, 0)).reshape(lags.shape[1], 2 * tone_count, -1)
-    return _Shifted(columns, heard.seen[:, whole].transpose(1, 2, 0))
+    return _Shifted(np.ascontiguousarray(parts.transpose(2, 3, 0, 1)), heard.seen[:, whole].transpose(1, 2, 0))
 
 
-def _information(place: _Shifted, tones: Sequence[Tones]) -> NDArray[np.float32]:
+def _information(place: _Shifted, seen: _Seen, tones: Sequence[Tones]) -> NDArray[np.float32]:
     """Correlations of the best candidates, (hypotheses, windows, kept, pairs of axes)."""
     count, axes, width = tones[0].shape
-    hypotheses, windows, observed = place.seen.shape
+    hypotheses, windows, observed, _ = place.columns.shape
     kept = min(count, _KEPT)
-    result = np.empty((hypotheses, windows, kept, observed * axes), dtype=np.float32)
-    for window in range(windows):
-        correlated = tones[window % len(tones)].reshape(count * axes, width) @ place.columns[window]
-        values = correlated.reshape(count, axes, hypotheses, observed).transpose(2, 0, 3, 1)
-        values = values.reshape(hypotheses, count, observed * axes)
-        if kept < count:
-            strongest = np.argpartition(-np.sum(values**2, axis=2), kept, axis=1)[:, :kept]
-            result[:, window] = np.take_along_axis(values, strongest[:, :, None], axis=1)
-        else:
-            result[:, window] = values
+    result = np.zeros((hypotheses, windows, kept, observed * axes), dtype=np.float32)
+    own = seen.numbers % len(tones)
+    for number in np.unique(own[seen.inside]):
+        # The windows of all hypotheses that are played from the same waveforms, at most so many at once.
+        rows, places = np.nonzero((own == number) & seen.inside)
+        flat = tones[number].reshape(count * axes, width)
+        for chunk in np.array_split(np.arange(len(rows)), -(-len(rows) * count // _MOST_CORRELATED)):
+            columns = place.columns[rows[chunk], places[chunk]].reshape(-1, width)
+            correlated = (columns @ flat.T).reshape(len(chunk), observed, count, axes)
+            values = correlated.transpose(0, 2, 1, 3).reshape(len(chunk), count, observed * axes)
+            if kept < count:
+                strongest = np.argpartition(-np.sum(values**2, axis=2), kept, axis=1)[:, :kept]
+                values = np.take_along_axis(values, strongest[:, :, None], axis=1)
+            result[rows[chunk], places[chunk]] = values
     return result
 
 

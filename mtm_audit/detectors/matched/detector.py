@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from mtm_audit.detectors.base import ChannelReading, Observation, Reading
+from mtm_audit.detectors.matched.byclock import Found
 from mtm_audit.detectors.matched.correlate import prepare
 from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recording_noise
 from mtm_audit.detectors.matched.evidence import log_sum_exp
@@ -14,7 +15,7 @@ from mtm_audit.detectors.matched.motion import Motion, uniform_motion
 from mtm_audit.detectors.matched.noise import NoiseModel, principal_axes
 from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_audit.detectors.matched.refine import refined_timing
-from mtm_audit.detectors.matched.search import Found, search_timings
+from mtm_audit.detectors.matched.search import search_timings
 from mtm_audit.detectors.matched.windows import LEAST_PART, Window, make_windows
 from mtm_audit.timing import Onset, Timing
 from mtm_audit.tracks import Floats

@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mtm_audit.detectors.matched.byclock import Found
 from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
 from mtm_audit.detectors.matched.correlate import Prepared, Tones, hear, stacked_tones
 from mtm_audit.detectors.matched.hypotheses import log_rate_prior
 from mtm_audit.detectors.matched.motion import Motion
-from mtm_audit.detectors.matched.search import Found, candidate_rates, lead_cells, waveform_sets
+from mtm_audit.detectors.matched.search import candidate_rates, lead_cells, waveform_sets
 from mtm_audit.detectors.matched.windows import LEAST_PART
 from mtm_audit.timing import Onset, Timing
 from mtm_audit.tracks import Floats

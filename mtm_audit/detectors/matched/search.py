@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mtm_audit.detectors.matched.byclock import Found, Place, starts_by_clock
 from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
 from mtm_audit.detectors.matched.correlate import Heard, Prepared, Tones, evidence_by_lag, hear, stacked_tones
 from mtm_audit.detectors.matched.hypotheses import Grid, Hypothesis, fold, make_grid
@@ -21,20 +22,10 @@ from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel, Scheme
 
 SEARCHED_RATES = 0.2
-# Where the onset is bounded by clocks that follow UTC, these run alike.
-TIMED_RATES = 0.02
 _PHASE_ERROR_RAD = 0.6
 _PEAKS_PER_RATE = 8
 _WEIGHED = 64
 _HALF_CELLS = np.arange(-3, 4) / 2.0
-
-
-@dataclass(frozen=True)
-class Found:
-    """The most probable timing of one codebook, and its log evidence against a recording without its message."""
-
-    timing: Timing
-    evidence: float
 
 
 @dataclass(frozen=True)
@@ -53,13 +44,14 @@ _Report = Callable[[float], None]
 def candidate_rates(scheme: Scheme, channel: Channel, onset: Onset) -> Floats:
     """Rates that are searched, as far apart as the highest tone's phase at a window's ends allows; nominal among them.
 
-    They span +-20 %; where clocks that follow UTC bound the onset, they bound the rate as well.
+    They span +-20 %; where clocks that follow UTC bound the onset the rate is the nominal one.
     """
-    searched = TIMED_RATES if isinstance(onset, OnsetRange) else SEARCHED_RATES
+    if isinstance(onset, OnsetRange):
+        return np.array([scheme.rate_hz])
     window_s = scheme.window_ticks(channel) / scheme.rate_hz
     step = 2.0 * _PHASE_ERROR_RAD / (np.pi * scheme.band_hz[1] * window_s)
-    count = int(np.ceil(searched / step))
-    rates: Floats = scheme.rate_hz * (1.0 + np.arange(-count, count + 1) * (searched / count))
+    count = int(np.ceil(SEARCHED_RATES / step))
+    rates: Floats = scheme.rate_hz * (1.0 + np.arange(-count, count + 1) * (SEARCHED_RATES / count))
     return rates
 
 
@@ -87,8 +79,8 @@ def search_timings(
 ) -> list[Found]:
     """For each codebook the best timing: rates, and onsets as far as they are not known.
 
-    Rates lie within +-20 %; where clocks bound the onset, they bound the rate as well. Under the fixed schedule the
-    onset found is that of the first window in step with the message.
+    Rates lie within +-20 %, and where clocks bound the onset near the nominal one. Under the fixed schedule the onset
+    found is that of the first window in step with the message.
     """
     scheme, motion = codebooks[0].scheme, prepared.motion
     ticks = scheme.window_ticks(channel)
@@ -96,6 +88,9 @@ def search_timings(
     lead = lead_cells(scheme, channel, motion, onset)
     windows = waveform_sets(scheme, channel, motion, onset)
     tones = [[stacked_tones(codebook, channel, number) for number in range(windows)] for codebook in codebooks]
+    if isinstance(onset, OnsetRange):
+        heard = hear(prepared, codebooks[0], channel, scheme.rate_hz, lead)
+        return starts_by_clock(heard, Place(motion, lead, ticks, scheme.rate_hz), tones, onset, progress)
     spacing = float(rates_hz[1] - rates_hz[0]) / scheme.rate_hz
 
     def place(coarse: int) -> tuple[Heard, Grid]:

@@ -7,12 +7,12 @@ import pytest
 
 from hil.experiments.robustness import JOBS, read_under
 from mtm_audit.detectors.base import Observation
+from mtm_audit.detectors.matched.byclock import Found
 from mtm_audit.detectors.matched.correlate import prepare
 from mtm_audit.detectors.matched.detector import MatchedDetector
 from mtm_audit.detectors.matched.estimate import fit_recording_noise
 from mtm_audit.detectors.matched.fleet import Member, share_timings
 from mtm_audit.detectors.matched.motion import uniform_motion
-from mtm_audit.detectors.matched.search import Found
 from mtm_audit.glimpse import glimpse_of_track
 from mtm_audit.timing import Timing
 from mtm_audit.verdict import decoy_codebooks

@@ -1,0 +1,41 @@
+"""`mtm-hil messages`: how often whole framed messages are received."""
+
+import csv
+from pathlib import Path
+
+from rich.console import Console
+
+from hil.experiments.cells import Cell, CellStore
+from hil.experiments.intervals import clopper_pearson
+from hil.experiments.messages import JOBS, payload_bps, receive
+from hil.experiments.sweep import run_sweep
+from mtm_onboard.protocol.atomicfile import replacing
+
+_COLUMNS = ("job", "payload_bps", "rollouts", "received", "share", "low", "high", "wrong")
+# Long recordings take long: a part of the rollouts.
+_REPEATED_PART = 4
+
+
+def messages(rollouts: int, seed: int, workers: int | None, out: Path | None, cells: Path, console: Console) -> None:
+    """Measure, print and, where asked, write the share of messages that are received."""
+    rows: list[tuple[object, ...]] = []
+    with CellStore(cells) as store:
+        for name, job in JOBS.items():
+            count = -(-rollouts // _REPEATED_PART) if job.repetitions > 1 else rollouts
+            asked = [Cell("messages", {"job": name}, seed + row) for row in range(count)]
+            results = run_sweep(receive, asked, store, console, workers)
+            received, wrong = (sum(bool(result[field]) for result in results) for field in ("received", "wrong"))
+            low, high = clopper_pearson(received, count)
+            print(
+                f"{name:52s} {received} of {count} received, {100 * received / count:.1f} % "
+                f"[{100 * low:.1f}-{100 * high:.1f}], {wrong} wrong, {payload_bps(job):.2f} bits/s of payload"
+            )
+            shares = [f"{value:.5f}" for value in (received / count, low, high)]
+            rows.append((name, f"{payload_bps(job):.4f}", count, received, *shares, wrong))
+    if out is not None:
+        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+            file.write(f"# mtm-hil messages -n {rollouts} --seed {seed} --out {out}\n")
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(_COLUMNS)
+            writer.writerows(rows)
+        print(f"wrote {out}")

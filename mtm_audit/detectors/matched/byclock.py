@@ -1,0 +1,102 @@
+"""Timing where clocks that follow UTC say the rate, and the start to half a minute or so.
+
+The rate being known, every start can be weighed with one set of gains for all windows, which finds messages that no
+window shows by itself. The best start's surroundings are then weighed at nearby rates as well.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
+from mtm_audit.detectors.matched.correlate import Heard, Tones
+from mtm_audit.detectors.matched.hypotheses import log_rate_prior
+from mtm_audit.detectors.matched.motion import Motion
+from mtm_audit.timing import OnsetRange, Timing
+from mtm_audit.tracks import Floats
+
+_CHUNK = 256
+# Rates that move the recording's ends by half a cell against its middle, and starts in half cells.
+_RATE_STEPS = np.arange(-6, 7)
+_HALF_CELLS = np.arange(-2, 3) / 2.0
+
+
+@dataclass(frozen=True)
+class Found:
+    """The most probable timing of one codebook, and its log evidence against a recording without its message."""
+
+    timing: Timing
+    evidence: float
+
+
+@dataclass(frozen=True)
+class Place:
+    """A motion, how many cells before it a window may begin, and how long windows are."""
+
+    motion: Motion
+    lead: int
+    ticks: int
+    nominal_hz: float
+
+
+def starts_by_clock(
+    heard: Heard,
+    place: Place,
+    tones: Sequence[Sequence[Tones]],
+    bounds: OnsetRange,
+    progress: Callable[[float], None] | None = None,
+) -> list[Found]:
+    """For each codebook the best timing with the first window's start within bounds.
+
+    `heard` at the nominal rate; `tones` of the windows of each codebook, as many for all.
+    """
+    step_s = place.motion.step_s
+    # Whole cells, so that nothing that was heard needs to be turned.
+    first = np.floor((bounds.low_s - place.motion.start_s) / step_s)
+    count = int(np.ceil((bounds.high_s - bounds.low_s) / step_s)) + 2
+    onsets_s = place.motion.start_s + (first + np.arange(count)) * step_s
+    evidences: list[list[Floats]] = [[] for _ in tones]
+    chunks = np.array_split(onsets_s, -(-count // _CHUNK))
+    for done, chunk in enumerate(chunks):
+        if progress is not None:
+            progress(done / len(chunks))
+        for collected, evidence in zip(evidences, _weigh(heard, place, tones, chunk, place.nominal_hz), strict=True):
+            collected.append(evidence)
+    starts_s = [float(onsets_s[np.argmax(np.concatenate(collected))]) for collected in evidences]
+    found: dict[float, list[Found]] = {}
+    for start_s in set(starts_s):
+        # Alternatives are the same for all codebooks, and few share a best start: their answers are cheap.
+        onsets, rates_hz = _around(place, start_s)
+        near = _weigh(
+            heard, place, [t for t, own in zip(tones, starts_s, strict=True) if own == start_s], onsets, rates_hz
+        )
+        prior = log_rate_prior(rates_hz, place.nominal_hz)
+        found[start_s] = [_best(evidence + prior, onsets, rates_hz) for evidence in near]
+    return [found[start_s].pop(0) for start_s in starts_s]
+
+
+def _weigh(
+    heard: Heard, place: Place, tones: Sequence[Sequence[Tones]], onsets_s: Floats, rates_hz: Floats | float
+) -> list[Floats]:
+    """Evidence (hypotheses,) of timings for each codebook."""
+    lengths_s = place.ticks / np.broadcast_to(rates_hz, onsets_s.shape)
+    begins_s = onsets_s[:, None] + np.arange(len(tones[0])) * lengths_s[:, None]
+    lags = (begins_s - place.motion.start_s) / place.motion.step_s + place.lead
+    inside = (lags >= 0) & (lags <= len(place.motion.seen) + place.lead - 1)
+    return coherent_evidence(heard, [Question(numbered, lags, inside) for numbered in tones], place.motion.step_s)
+
+
+def _around(place: Place, start_s: float) -> tuple[Floats, Floats]:
+    """Onsets and rates near a start, turned about the window in the recording's middle."""
+    motion, length_s = place.motion, place.ticks / place.nominal_hz
+    lasts_s = len(motion.seen) * motion.step_s
+    rates_hz = place.nominal_hz * (1.0 + _RATE_STEPS * motion.step_s / lasts_s)
+    middle = np.rint((motion.start_s + lasts_s / 2.0 - start_s) / length_s)
+    onsets_s = start_s + middle * (length_s - place.ticks / rates_hz)
+    return (onsets_s[:, None] + _HALF_CELLS * motion.step_s).ravel(), np.repeat(rates_hz, len(_HALF_CELLS))
+
+
+def _best(evidence: Floats, onsets_s: Floats, rates_hz: Floats) -> Found:
+    place = int(np.argmax(evidence))
+    return Found(Timing(float(onsets_s[place]), float(rates_hz[place])), float(evidence[place]))
