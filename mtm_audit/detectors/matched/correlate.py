@@ -1,5 +1,6 @@
 """The whitened motion correlated with every tone at every instant: what all candidates of all codebooks share."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,9 @@ from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel
 
 Tones = NDArray[np.float32]
+
+# Candidates times lags of one computation.
+_MOST_CORRELATED = 1 << 19
 
 _TYPICAL = plant_family(np.array([0.07]), np.array([0.14]))
 
@@ -104,18 +108,36 @@ def template_power(tones: Tones, heard: Heard) -> Floats:
     return power
 
 
-def evidence_by_lag(tones: Tones, heard: Heard) -> Floats:
-    """Log of the mean over candidates of the evidence with gains unknown: `tones` (M, axes, 2 K) to (lags,)."""
-    count = len(tones)
-    total = np.zeros((count, heard.projections.shape[-1]), dtype=np.float32)
-    penalty = np.zeros(total.shape[1])
-    for axis, power in enumerate(template_power(tones, heard)):
+def evidence_by_lag(tones: Sequence[Sequence[Tones]], heard: Heard) -> NDArray[np.float32]:
+    """Log of the mean over candidates of the evidence with gains unknown, (codebooks, numbered windows, lags).
+
+    `tones` holds arrays (M, axes, 2 K), of as many windows for each codebook.
+    """
+    count, lags = len(tones[0][0]), heard.projections.shape[-1]
+    flat = [tone for numbered in tones for tone in numbered]
+    result = np.empty((len(flat), lags), dtype=np.float32)
+    together = max(1, _MOST_CORRELATED // (count * lags))
+    for first in range(0, len(flat), together):
+        result[first : first + together] = _evidence_of(np.stack(flat[first : first + together]), heard)
+    return result.reshape(len(tones), -1, lags)
+
+
+def _evidence_of(tones: Tones, heard: Heard) -> NDArray[np.float32]:
+    """The same for sets of waveforms (sets, M, axes, 2 K) to (sets, lags)."""
+    sets, count, axes, width = tones.shape
+    total = np.zeros((sets * count, heard.projections.shape[-1]), dtype=np.float32)
+    penalty = np.zeros((sets, total.shape[1]), dtype=np.float32)
+    powers = np.stack([template_power(tone, heard) for tone in tones])
+    # Waveforms differ little in power, so that one scale serves all candidates of a set.
+    for axis in range(axes):
+        flat = np.ascontiguousarray(tones[:, :, axis]).reshape(sets * count, width)
         for projection, seen in zip(heard.projections, heard.seen, strict=True):
-            energy = power * seen
-            correlation = tones[:, axis] @ projection
+            energy = (powers[:, axis, None] * seen).astype(np.float32)
+            correlation = flat @ projection
             correlation *= correlation
-            correlation *= (0.5 * GAIN_VARIANCE / (1.0 + GAIN_VARIANCE * energy)).astype(np.float32)
+            scale = np.float32(0.5 * GAIN_VARIANCE) / (1.0 + np.float32(GAIN_VARIANCE) * energy)
+            by_set = correlation.reshape(sets, count, -1)
+            by_set *= scale[:, None]
             total += correlation
-            penalty += 0.5 * np.log1p(GAIN_VARIANCE * energy)
-    evidence: Floats = log_sum_exp(total, axis=0) - np.log(count) - penalty
-    return evidence
+            penalty += np.float32(0.5) * np.log1p(np.float32(GAIN_VARIANCE) * energy)
+    return log_sum_exp(total.reshape(sets, count, -1), axis=1) - np.float32(np.log(count)) - penalty

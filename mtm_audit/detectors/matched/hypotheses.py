@@ -80,12 +80,22 @@ def log_rate_prior(rates_hz: Floats, nominal_hz: float) -> Floats:
     return np.asarray(-np.log1p(((rates_hz / nominal_hz - 1.0) / _USUAL_RATE_ERROR) ** 2))
 
 
-def fold(evidence: Floats, grid: Grid, most: int) -> list[Hypothesis]:
-    """Add up the windows' evidence (numbered windows, lags) and return the best hypotheses, one a local maximum."""
+def fold(evidence: Floats, grid: Grid, most: int) -> list[list[Hypothesis]]:
+    """Add up the windows' evidence (codebooks, numbered windows, lags) and return each codebook's best hypotheses, one
+    a local maximum.
+    """
+    places = np.clip(np.rint(grid.lags).astype(np.int64), 0, evidence.shape[2] - 1)
+    # Windows that cannot be seen point at a place of their own that says nothing.
+    flat = np.where(grid.inside, grid.rows * evidence.shape[2] + places, evidence.shape[1] * evidence.shape[2])
+    # Windows outermost, so that sums run along memory.
+    flat = np.ascontiguousarray(flat.transpose(2, 0, 1))
     # A window either carries the message or is silent, even odds: a recording may hold more than the message.
     carried = np.logaddexp(0.0, evidence) - np.log(2.0)
-    places = np.clip(np.rint(grid.lags).astype(np.int64), 0, evidence.shape[1] - 1)
-    totals = np.where(grid.inside, carried[grid.rows, places], 0.0).sum(axis=2) + grid.prior[:, None]
+    return [_peaks(np.append(each, 0.0)[flat].sum(axis=0) + grid.prior[:, None], most) for each in carried]
+
+
+def _peaks(totals: Floats, most: int) -> list[Hypothesis]:
+    """The best starts of (fine rates, starts), each at its best rate."""
     rates = np.argmax(totals, axis=0)
     ridge = totals[rates, np.arange(totals.shape[1])]
     padded = np.concatenate([[-np.inf], ridge, [-np.inf]])

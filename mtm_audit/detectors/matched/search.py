@@ -131,9 +131,8 @@ def _onsets_and_rates(
     for coarse in range(rates):
         report(0.5 * coarse / rates)
         heard, grid = place(coarse)
-        for number, numbered in enumerate(tones):
-            evidence = np.stack([evidence_by_lag(tone, heard) for tone in numbered])
-            candidates[number] += [_Candidate(coarse, peak) for peak in fold(evidence, grid, _PEAKS_PER_RATE)]
+        for number, peaks in enumerate(fold(evidence_by_lag(tones, heard), grid, _PEAKS_PER_RATE)):
+            candidates[number] += [_Candidate(coarse, peak) for peak in peaks]
     chosen = [sorted(found, key=lambda item: -item.hypothesis.evidence)[:_WEIGHED] for found in candidates]
     best = [(-np.inf, found[0]) for found in chosen]
     for coarse in sorted({item.coarse for found in chosen for item in found}):
