@@ -60,7 +60,9 @@ def decode(
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
-    detector: Annotated[str, typer.Option(metavar="NAME", help="How to look for the noise.")] = "coherency",
+    detector: Annotated[
+        str, typer.Option(metavar="NAME", help="How to look for the noise: matched, or coherency as the paper does.")
+    ] = "matched",
     decoys: Annotated[int, typer.Option(min=8, help="Keys that nobody holds, to compare with.")] = 40,
     threshold: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="Largest p-value that still counts as a message.")

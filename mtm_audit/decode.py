@@ -32,7 +32,7 @@ class DecodeSettings:
     was made, which a rolling schedule needs.
     """
 
-    detector: str = "coherency"
+    detector: str = "matched"
     onset_s: float | None = None
     decoys: int = 40
     threshold: float = 1e-4

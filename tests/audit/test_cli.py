@@ -45,11 +45,15 @@ def folder(tmp_path_factory):
 
 @pytest.fixture
 def audit(folder, capsys):
-    """Run `mtm-audit decode` with the key; gives the exit code, standard output and standard error."""
+    """Run `mtm-audit decode` with the key; gives the exit code, standard output and standard error.
 
-    def run(*arguments, key="robot.key"):
+    With the paper's detector unless told otherwise: it is the quicker one, and the command is what is tested here.
+    """
+
+    def run(*arguments, key="robot.key", detector="coherency"):
+        chosen = [] if detector is None else ["--detector", detector]
         with pytest.raises(SystemExit) as left:
-            main(["decode", *map(str, arguments), "--key", str(folder / key)])
+            main(["decode", *map(str, arguments), "--key", str(folder / key), *chosen])
         out, err = capsys.readouterr()
         assert "Traceback" not in out + err
         assert FAKE_SECRET.hex() not in out + err
@@ -65,6 +69,12 @@ def refused(answer, words):
     assert err.startswith("mtm-audit: ")
     assert err.count("\n") == 1
     assert words in err
+
+
+def test_without_a_word_about_it_the_matched_detector_decodes(audit, folder):
+    code, out, _ = audit(folder / "sent", detector=None)
+    assert code == 0
+    assert "log-likelihood ratio" in out
 
 
 def test_a_decode_says_the_message_first_and_then_why(audit, folder):
@@ -315,7 +325,7 @@ def test_a_truncated_video_is_refused(audit, video):
 
 def test_names_that_do_not_exist_are_refused_with_those_that_do(audit, folder):
     refused(audit(folder / "sent", "--tracker", "eyes"), "choose one of: aruco")
-    refused(audit(folder / "sent", "--detector", "guessing"), "choose one of: coherency")
+    refused(audit(folder / "sent", detector="guessing"), "choose one of: coherency")
     refused(audit(folder / "sent", "--assign", "arm=robot0"), "its bodies are: robot0, robot1")
 
 

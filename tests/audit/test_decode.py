@@ -10,7 +10,7 @@ from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.framing import number_of_symbols, symbols_of_number
 from tests.audit.moving_robot import OTHER_SECRET, key_of, robot_track, scheme_of
 
-KNOWN = DecodeSettings(onset_s=1.0, decoys=30)
+KNOWN = DecodeSettings("coherency", onset_s=1.0, decoys=30)
 PAIR = key_of(scheme_of(symbols=(1, 1), ticks=400))
 SENT = (3, 1)
 
@@ -34,7 +34,7 @@ def test_a_message_is_decoded():
 
 
 def test_a_message_is_decoded_when_nobody_knows_when_it_began():
-    decoding = decode_tracks(pair(), PAIR, DecodeSettings(decoys=30))
+    decoding = decode_tracks(pair(), PAIR, DecodeSettings("coherency", decoys=30))
     assert (decoding.verdict, decoding.message) == ("decoded", 13)
     for channel in decoding.channels:
         assert channel.reading is not None
@@ -48,7 +48,7 @@ def test_the_wrong_key_finds_nothing():
 
 
 def test_the_wrong_key_finds_nothing_however_long_it_searches():
-    decoding = decode_tracks(pair(), key_of(PAIR.scheme, OTHER_SECRET), DecodeSettings(decoys=30))
+    decoding = decode_tracks(pair(), key_of(PAIR.scheme, OTHER_SECRET), DecodeSettings("coherency", decoys=30))
     assert (decoding.verdict, decoding.message) == ("absent", None)
 
 
@@ -56,23 +56,23 @@ def test_the_wrong_key_finds_nothing_however_long_it_searches():
 def test_a_recording_that_is_far_too_long_is_refused_before_the_search(late_s):
     tracks = tuple(replace(track, times_s=np.append(track.times_s[:-1], late_s)) for track in pair())
     with pytest.raises(MtmError, match="no more than 10000 s can be searched; .*seconds"):
-        decode_tracks(tracks, PAIR, DecodeSettings(decoys=8))
+        decode_tracks(tracks, PAIR, DecodeSettings("coherency", decoys=8))
 
 
 def test_a_recording_shorter_than_a_tick_is_refused():
     tracks = tuple(replace(track, times_s=track.times_s * 1e-7) for track in pair())
     with pytest.raises(MtmError, match="no whole window"):
-        decode_tracks(tracks, PAIR, DecodeSettings(decoys=8))
+        decode_tracks(tracks, PAIR, DecodeSettings("coherency", decoys=8))
 
 
 def test_a_robot_that_stands_still_says_nothing():
     tracks = tuple(replace(track, positions=np.ones_like(track.positions)) for track in pair())
-    assert decode_tracks(tracks, PAIR, DecodeSettings(decoys=8)).verdict == "absent"
+    assert decode_tracks(tracks, PAIR, DecodeSettings("coherency", decoys=8)).verdict == "absent"
 
 
 @pytest.mark.parametrize("onset_s", [1.0, None])
 def test_robots_that_send_nothing_give_absent(onset_s):
-    decoding = decode_tracks(pair((None, None)), PAIR, DecodeSettings(onset_s=onset_s, decoys=12))
+    decoding = decode_tracks(pair((None, None)), PAIR, DecodeSettings("coherency", onset_s=onset_s, decoys=12))
     assert (decoding.verdict, decoding.message) == ("absent", None)
 
 
@@ -122,7 +122,7 @@ def test_a_pooled_message_survives_a_missing_robot(pooling):
 def test_a_recording_that_starts_in_the_middle_of_a_message_is_read_all_the_same():
     key = key_of(scheme_of(symbols=(1, 1), ticks=400))
     tracks = [robot_track(key, f"robot{n}", (SENT[n],), 21.0, onset_s=-5.0, seed=n) for n in range(2)]
-    decoding = decode_tracks(tracks, key, DecodeSettings(decoys=30))
+    decoding = decode_tracks(tracks, key, DecodeSettings("coherency", decoys=30))
     assert (decoding.verdict, decoding.symbols) == ("decoded", SENT)
 
 
@@ -132,26 +132,26 @@ SEVERAL = key_of(scheme_of(symbols=(2,), ticks=600))
 def test_a_repeated_message_whose_beginning_nobody_saw_is_not_put_together():
     """3 1 3 1 3 is the message 3 1 or the message 1 3: neither may be called decoded."""
     track = robot_track(SEVERAL, "robot0", (3, 1), 26.0, onset_s=-4.0)
-    decoding = decode_tracks([track], SEVERAL, DecodeSettings(decoys=30))
+    decoding = decode_tracks([track], SEVERAL, DecodeSettings("coherency", decoys=30))
     assert sorted(decoding.symbols) == [1, 3]
     assert (decoding.verdict, decoding.message, decoding.order_known) == ("inconclusive", None, False)
 
 
 def test_a_repeated_message_is_put_together_when_its_beginning_is_given():
     track = robot_track(SEVERAL, "robot0", (3, 1), 26.0, onset_s=-4.0)
-    decoding = decode_tracks([track], SEVERAL, DecodeSettings(onset_s=8.0, decoys=30))
+    decoding = decode_tracks([track], SEVERAL, DecodeSettings("coherency", onset_s=8.0, decoys=30))
     assert (decoding.verdict, decoding.symbols) == ("decoded", (3, 1))
 
 
 def test_a_message_of_several_symbols_that_is_sent_once_needs_no_onset():
     track = robot_track(SEVERAL, "robot0", (3, 1), 14.0, onset_s=1.0)
-    decoding = decode_tracks([track], SEVERAL, DecodeSettings(decoys=30))
+    decoding = decode_tracks([track], SEVERAL, DecodeSettings("coherency", decoys=30))
     assert (decoding.verdict, decoding.symbols) == ("decoded", (3, 1))
 
 
 def test_the_order_of_equal_symbols_does_not_matter():
     track = robot_track(SEVERAL, "robot0", (2, 2), 26.0, onset_s=-4.0)
-    decoding = decode_tracks([track], SEVERAL, DecodeSettings(decoys=30))
+    decoding = decode_tracks([track], SEVERAL, DecodeSettings("coherency", decoys=30))
     assert (decoding.verdict, decoding.symbols) == ("decoded", (2, 2))
 
 
@@ -201,7 +201,7 @@ def found_by_body(decoding):
 
 @pytest.mark.parametrize("onset_s", [1.0, None])
 def test_tracks_whose_names_say_nothing_are_matched_by_search(onset_s):
-    decoding = decode_tracks(strangers(), FLEET, DecodeSettings(onset_s=onset_s, decoys=20))
+    decoding = decode_tracks(strangers(), FLEET, DecodeSettings("coherency", onset_s=onset_s, decoys=20))
     assert (decoding.verdict, decoding.symbols) == ("decoded", (3, 1, 2))
     assert found_by_body(decoding) == {"robot0": "thing b", "robot1": "thing c", "robot2": "thing a"}
     assert all(item.searched for item in decoding.channels)
@@ -219,7 +219,7 @@ def test_the_matched_detector_finds_each_body_s_track_too():
 @pytest.mark.parametrize("onset_s", [1.0, None])
 def test_the_wrong_key_finds_nothing_however_tracks_are_matched(onset_s):
     wrong = key_of(FLEET.scheme, OTHER_SECRET)
-    decoding = decode_tracks(strangers(), wrong, DecodeSettings(onset_s=onset_s, decoys=20))
+    decoding = decode_tracks(strangers(), wrong, DecodeSettings("coherency", onset_s=onset_s, decoys=20))
     assert (decoding.verdict, decoding.message) == ("absent", None)
     assert decoding.evidence.p_value > 0.01
 

@@ -28,7 +28,7 @@ def track(number=0, seconds=10.0, onset_s=1.0, rate_scale=1.0, rate_hz=100.0):
 
 def told(*tracks, onset_s=1.0, warnings=(), decoys=20):
     recording = Recording((Path("recording.tum"),), "motion capture", tracks, warnings)
-    decoding = decode_tracks(tracks, KEY, DecodeSettings(onset_s=onset_s, decoys=decoys))
+    decoding = decode_tracks(tracks, KEY, DecodeSettings("coherency", onset_s=onset_s, decoys=decoys))
     return remarks(recording, decoding), advice(recording, decoding), decoding
 
 
@@ -82,7 +82,7 @@ def test_a_track_too_short_to_read_is_remarked_beside_one_that_was_read():
 def test_an_absent_message_is_not_given_advice_about_symbols():
     wrong = key_of(KEY.scheme, b"one more fake secret, only tests")
     recording = Recording((Path("a.tum"),), "motion capture", (track(0), track(1)))
-    decoding = decode_tracks(recording.tracks, wrong, DecodeSettings(onset_s=1.0, decoys=20))
+    decoding = decode_tracks(recording.tracks, wrong, DecodeSettings("coherency", onset_s=1.0, decoys=20))
     (sentence,) = advice(recording, decoding)
     assert "symbol" not in sentence
 
@@ -93,7 +93,7 @@ def test_an_absent_message_is_not_given_advice_about_symbols():
 )
 def test_the_advised_length_grows_with_the_doubt(posterior, words):
     recording = Recording((Path("a.tum"),), "motion capture", (track(0), track(1)))
-    decoding = decode_tracks(recording.tracks, KEY, DecodeSettings(onset_s=1.0, decoys=20))
+    decoding = decode_tracks(recording.tracks, KEY, DecodeSettings("coherency", onset_s=1.0, decoys=20))
     posteriors = decoding.posteriors.copy()
     posteriors[1] = (1.0 - posterior) / 3.0
     posteriors[1, 2] = posterior
