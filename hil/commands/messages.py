@@ -12,8 +12,8 @@ from hil.experiments.sweep import run_sweep
 from mtm_onboard.protocol.atomicfile import replacing
 
 _COLUMNS = ("job", "payload_bps", "rollouts", "received", "share", "low", "high", "wrong")
-# Long recordings take long: a part of the rollouts.
-_REPEATED_PART = 4
+# The first job has all rollouts, the others a part of them; long recordings take long.
+_OTHERS_PART, _REPEATED_PART = 4, 8
 
 
 def messages(rollouts: int, seed: int, workers: int | None, out: Path | None, cells: Path, console: Console) -> None:
@@ -21,7 +21,8 @@ def messages(rollouts: int, seed: int, workers: int | None, out: Path | None, ce
     rows: list[tuple[object, ...]] = []
     with CellStore(cells) as store:
         for name, job in JOBS.items():
-            count = -(-rollouts // _REPEATED_PART) if job.repetitions > 1 else rollouts
+            part = _REPEATED_PART if job.repetitions > 1 else _OTHERS_PART if rows else 1
+            count = -(-rollouts // part)
             asked = [Cell("messages", {"job": name}, seed + row) for row in range(count)]
             results = run_sweep(receive, asked, store, console, workers)
             received, wrong = (sum(bool(result[field]) for result in results) for field in ("received", "wrong"))
