@@ -127,7 +127,7 @@ def false_alarms(
 
 @app.command()
 def messages(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Messages of the first kind; a part of it of the others.")] = 200,
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Messages of the first kind; fewer of the others.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="The first rollout's seed.")] = 700_000,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
