@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test lint bench firmware deb deb-test clean
+.PHONY: setup demo test lint bench mutants firmware deb deb-test clean
 
 setup: $(STAMP)
 
@@ -38,6 +38,9 @@ deb:
 # As root, with debootstrap and a network: installs the package into a clean Debian and drives a simulated robot there.
 deb-test: setup
 	MTM_CLEAN_ROOT=1 $(BIN)/pytest tests/packaging/test_clean_root.py -s
+
+mutants: setup
+	$(BIN)/python -m tests.mutation
 
 bench: setup
 	$(BIN)/pytest tests/benchmarks --benchmark-enable -s

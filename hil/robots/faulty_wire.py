@@ -32,7 +32,7 @@ class WireFaults:
     reorder: float = 0.0
     delay_s: tuple[float, float] = (0.0, 0.0)
     block_s: float = 0.0
-    block_every_s: float = 0.5
+    block_every_s: float = 0.47  # in step with no tick and no trial to open a link
 
 
 class Direction:

@@ -90,6 +90,12 @@ def test_a_command_that_is_not_finite_is_refused_and_the_last_good_one_ages(bad)
     assert guard.admit(BodyVelocity(bad, 0.1, 0.0), 0.3, 0.3) == STOP
 
 
+def test_a_first_command_that_is_not_finite_is_as_good_as_none():
+    guard = plain_guard()
+    assert guard.admit(BodyVelocity(math.nan, 0.0, 0.0), 0.0, 0.0) == STOP
+    assert (guard.flags, guard.stale) == (REFUSED | STALE, 1)
+
+
 def test_a_command_from_before_the_link_came_back_holds_the_robot_still():
     guard = plain_guard(acceleration_mps2=0.1)
     guard.admit(BASE, 0.0, 0.0)
