@@ -99,6 +99,7 @@ def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str]) -
         Text(f"scheme     {scheme.name} (fingerprint {scheme.fingerprint})"),
         Text(f"recording  {recording_line(recording)}"),
         Text(f"evidence   {evidence_sentence(decoding)}"),
+        *(Text(line) for line in [_frame_line(decoding)] if line),
         Text(""),
         _table_of(decoding),
     ]
@@ -133,15 +134,15 @@ def _frame_table(decoding: Decoding) -> Table:
         margin = float(np.median(ranked[:, -1] - ranked[:, -2]))
         starts = [f"{channel.onset_s:.2f}", f"{reading.timing.rate_hz:.2f}"]
         table.add_row(*head, *starts, str(len(ranked)), _score(margin))
-    sure = sum(symbol is not None for symbol in decoding.symbols) - len(_doubtful(decoding))
-    seen = sum(symbol is not None for symbol in decoding.symbols)
-    table.add_section()
-    table.add_row("frame", f"{sure} of {len(decoding.symbols)} symbols sure, {len(decoding.symbols) - seen} not seen")
     return table
 
 
-def _doubtful(decoding: Decoding) -> list[int]:
-    return [place for place in decoding.uncertain if decoding.symbols[place] is not None]
+def _frame_line(decoding: Decoding) -> str | None:
+    """How many of a frame's symbols were seen, and are sure; None without a frame."""
+    if not decoding.frames:
+        return None
+    count, unseen = len(decoding.symbols), sum(symbol is None for symbol in decoding.symbols)
+    return f"frame      {count - len(decoding.uncertain)} of {count} symbols are sure, {unseen} were not seen"
 
 
 def _symbol_table(decoding: Decoding) -> Table:

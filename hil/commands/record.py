@@ -1,6 +1,8 @@
 """`mtm-hil record`: drive the simulated robots and record them."""
 
+import time
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 from rich.console import Console
@@ -50,6 +52,8 @@ def record(options: RecordOptions, console: Console) -> None:
     settings = RunSettings(
         key, symbols, options.seconds, options.seed, options.wire, START_S if options.realtime else LEAD_S,
         payload=options.message if framed else None,
+        # A rolling schedule needs a time of day, and a recording made now has this one.
+        unix_s=time.time() if key.scheme.schedule == "rolling" and not options.realtime else None,
     )  # fmt: skip
     with new_folder(options.out) as folder:
         if options.key is None:
@@ -69,10 +73,13 @@ def record(options: RecordOptions, console: Console) -> None:
 
 
 def _say_what_was_recorded(options: RecordOptions, settings: RunSettings) -> None:
-    sent = "no message" if options.message is None else f"message {options.message}, from {settings.start_s:g} s on"
+    sent = "no message" if options.message is None else f"message {options.message}, from {settings.onset_s:.4g} s on"
     print(f"{options.out}: {options.seconds:g} s of motion, {sent}")
     scheme = settings.key.scheme
-    whole_s = settings.start_s + scheme.message_ticks / scheme.rate_hz
+    if settings.unix_s is not None:
+        began = datetime.fromtimestamp(settings.unix_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+        print(f"it began at {began}; decode it with --at {began} --at-error 1")
+    whole_s = settings.onset_s + scheme.message_ticks / scheme.rate_hz
     if options.message is not None and options.seconds < whole_s:
         print(f"the message is cut off; it takes --seconds {whole_s:g} to record it once")
     if options.key is None:

@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from datetime import UTC, datetime
 
 import pytest
 
@@ -15,6 +16,7 @@ from hil.lockstep import run_lockstep
 from hil.programs import program
 from mtm_audit.recordings.motion_capture import read_tum
 from mtm_audit.recordings.video import read_frames
+from mtm_onboard.cli import main as onboard
 from mtm_onboard.protocol import load_key
 
 QUICK = ["record", "--seconds", "2", "--wire", "direct"]
@@ -38,6 +40,19 @@ def test_a_recording_has_motion_capture_the_truth_and_the_key(tmp_path, capsys):
     assert key.secret.hex() not in (tmp_path / "a" / "truth.json").read_text()
     assert len(read_tum(tmp_path / "a" / "mocap" / "robot3.tum").times_s) == 201
     assert sorted(path.name for path in (tmp_path / "a").iterdir()) == ["mocap", "robot.key", "truth.json"]
+
+
+def test_a_rolling_recording_says_when_it_was_made(tmp_path, capsys):
+    key = tmp_path / "rolling.key"
+    channels = [f"--channel=robot{number}:vx,vy:1:0.1" for number in range(4)]
+    keygen = ["--rate=50", "--band=0.5:5", "--alphabet=4", "--message-ticks=50", "--schedule=rolling", *channels]
+    assert onboard(["keygen", "--id", "fake", "--name", "rolling", "--out", str(key), *keygen]) == 0
+    assert run("record", "--seconds", "6", "--wire", "direct", "--message", 5, "--no-video", "--key", key,
+               "--out", tmp_path / "a") == 0  # fmt: skip
+    truth = json.loads((tmp_path / "a" / "truth.json").read_text())
+    assert abs(truth["unix_s"] - time.time()) < 600.0
+    began = datetime.fromtimestamp(truth["unix_s"], UTC).isoformat(timespec="milliseconds")
+    assert f"decode it with --at {began.replace('+00:00', 'Z')}" in capsys.readouterr().out
 
 
 def test_a_recording_is_filmed_and_a_key_that_is_given_stays_where_it_is(tmp_path):
