@@ -201,7 +201,7 @@ def _read(film: Floats, begin_unix_s: float, seed: int, detector_name: str) -> t
     onset_s = slot_start_unix_s(slot, _SCHEME) - begin_unix_s
     detector = make_detector(detector_name)
     observation = Observation(_SCHEME.channels[0], glimpse_of_track(track))
-    (result,) = detector.read(_KEY.codebook(slot), decoy_codebooks(_KEY, _DECOYS), [observation], onset_s)
+    (result,) = detector.read(_KEY.codebook(slot), decoy_codebooks(_KEY, _DECOYS, slot), [observation], onset_s)
     if isinstance(result, MtmError):
         raise result
     reading = result.reading
