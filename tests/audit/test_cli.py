@@ -247,7 +247,11 @@ def test_an_interrupt_ends_with_130_and_no_answer(audit, folder, monkeypatch):
 
 def run_program(*arguments, **options):
     command = [sys.executable, "-c", "from mtm_audit.cli import main; main()", *map(str, arguments)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+    # Programs in the background inherit that interrupts are ignored, and these are to be interrupted.
+    heed = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed, **options
+    )
 
 
 def test_control_c_during_the_work_leaves_nothing_half_done(folder, tmp_path):
