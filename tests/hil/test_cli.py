@@ -144,7 +144,9 @@ def test_help_loads_neither_opencv_nor_scipy():
 @pytest.mark.parametrize(("request_to_end", "code", "says"), [(signal.SIGINT, 130, 1), (signal.SIGTERM, 143, 0)])
 def test_a_program_that_is_asked_to_end_leaves_nothing(tmp_path, request_to_end, code, says):
     wanted = ["record", "--no-message", "--seconds", "5000", "--out", str(tmp_path / "a")]
-    started = subprocess.Popen([program("mtm-hil"), *wanted], stderr=subprocess.PIPE)
+    # Programs in the background inherit that interrupts are ignored, and this one is to be interrupted.
+    heed = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
+    started = subprocess.Popen([program("mtm-hil"), *wanted], stderr=subprocess.PIPE, preexec_fn=heed)
     deadline_s = time.monotonic() + 20.0
     while not list(tmp_path.iterdir()):
         assert time.monotonic() < deadline_s

@@ -45,7 +45,7 @@ def outage(tmp_path_factory):
 
 def test_the_windows_that_were_sent_still_decode(outage):
     track, _ = outage
-    decoding = decode_tracks((track,), KEY, DecodeSettings(onset_s=0.0, decoys=30))
+    decoding = decode_tracks((track,), KEY, DecodeSettings("coherency", onset_s=0.0, decoys=30))
     assert (decoding.verdict, decoding.symbols) == ("decoded", SYMBOLS)
 
 
