@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.special import softmax
 
 from mtm_audit.assignment import assign_tracks
 from mtm_audit.detectors import make_detector
@@ -171,10 +172,9 @@ def _heard(readings: Readings, scheme: Scheme) -> list[Heard]:
 def _frame_symbols(frame: Delivered) -> tuple[Floats, tuple[int | None, ...]]:
     """Posteriors (L, M) and decisions of a frame's symbols, each by itself."""
     ratios = frame.ratios
-    weights = np.exp(ratios - ratios.max(axis=1, keepdims=True))
     seen = np.ptp(ratios, axis=1) > 0.0
     symbols = tuple(int(best) if known else None for best, known in zip(np.argmax(ratios, axis=1), seen, strict=True))
-    return weights / weights.sum(axis=1, keepdims=True), symbols
+    return softmax(ratios, axis=1), symbols
 
 
 def _channel_decoding(channel: Channel, readings: Readings, scheme: Scheme) -> ChannelDecoding:
@@ -195,9 +195,7 @@ def _message_symbols(scheme: Scheme, channels: Sequence[ChannelDecoding]) -> tup
         return posteriors, tuple(int(symbol) if known else None for symbol, known in zip(best, seen, strict=True))
     read = [decoding for decoding in channels if decoding.reading is not None]
     logs = np.sum([np.log(np.maximum(decoding.posteriors, 1e-300)) for decoding in read], axis=0)
-    posteriors = np.exp(logs - logs.max(axis=1, keepdims=True))
-    posteriors /= posteriors.sum(axis=1, keepdims=True)
-    return posteriors, tuple(_pooled(scheme, read))
+    return softmax(logs, axis=1), tuple(_pooled(scheme, read))
 
 
 def _pooled(scheme: Scheme, read: Sequence[ChannelDecoding]) -> list[int]:

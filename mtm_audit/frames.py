@@ -10,6 +10,7 @@ from itertools import groupby, islice
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import log_softmax
 
 from mtm_audit.detectors.base import ChannelReading
 from mtm_audit.message import Message, decode_message
@@ -78,7 +79,7 @@ class _Sight:
         self._ratios: dict[int, Floats] = {}
         self._spans_s: dict[int, tuple[float, float]] = {}
         for item in heard:
-            first = _first_position(item.channel, scheme)
+            first = scheme.first_position(item.channel)
             window_s = scheme.window_ticks(item.channel) / item.result.reading.timing.rate_hz
             numbers = _numbers(item, heard[0], scheme, window_s) + turn
             slots, places = np.divmod(numbers, item.channel.symbols)
@@ -117,9 +118,9 @@ class _Sight:
 
 def _says(ratios: Floats, symbols: Integers) -> bool:
     """Whether windows (L, M) of one slot speak for these symbols: those before the message's first slot do not."""
-    logs = ratios - ratios.max(axis=1, keepdims=True)
-    posteriors = logs - np.log(np.mean(np.exp(logs), axis=1, keepdims=True))
-    return float(posteriors[np.arange(len(symbols)), symbols].sum()) > 0.0
+    # Log posteriors against those of chance, so that what was not seen counts nothing.
+    gains = log_softmax(ratios, axis=1) + np.log(ratios.shape[1])
+    return float(gains[np.arange(len(symbols)), symbols].sum()) > 0.0
 
 
 def _cuts(sights: Sequence[_Sight]) -> Iterator[tuple[_Sight, int]]:
@@ -155,9 +156,3 @@ def _numbers(item: Heard, first: Heard, scheme: Scheme, window_s: float) -> Inte
     if scheme.schedule == "rolling" or item.channel.symbols != first.channel.symbols:
         return reading.window_numbers
     return reading.window_numbers + round((reading.timing.onset_s - first.result.reading.timing.onset_s) / window_s)
-
-
-def _first_position(channel: Channel, scheme: Scheme) -> int:
-    if scheme.combine == "same":
-        return 0
-    return sum(other.symbols for other in scheme.channels[: scheme.channels.index(channel)])

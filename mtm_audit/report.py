@@ -147,7 +147,8 @@ def _frame_line(decoding: Decoding) -> str | None:
 
 def _symbol_table(decoding: Decoding) -> Table:
     table = _table("channel", "track", "start s", "rate Hz", "windows", "symbol", "sure", "best", "next", "margin")
-    for channel, first in _with_places(decoding):
+    for channel in decoding.channels:
+        first = decoding.scheme.first_position(channel.channel)
         reading, head = channel.reading, [channel.channel.name, _track_name(channel)]
         if reading is None:
             table.add_row(*head, "-", "-", "0", "-", "-", "-", "-", "-")
@@ -179,15 +180,6 @@ def _absent_table(decoding: Decoding) -> Table:
     table.add_section()
     table.add_row("together", "", "", _score(evidence.strength), f"{_score(mean)} ± {_score(spread)}")
     return table
-
-
-def _with_places(decoding: Decoding) -> list[tuple[ChannelDecoding, int]]:
-    """Each channel with the place of its first symbol in the message."""
-    places, first = [], 0
-    for channel in decoding.channels:
-        places.append((channel, first))
-        first += channel.channel.symbols if decoding.scheme.combine == "split" else 0
-    return places
 
 
 def percent(probability: float) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import softmax
 
 from mtm_audit.detectors.base import ChannelReading, Observation, Reading, combine_repeats, whole_windows
 from mtm_audit.detectors.welch import Complexes, mean_coherency, segment_spectra
@@ -91,9 +92,7 @@ class CoherencyDetector:
         variance = null.var(axis=(0, 2))
         shift = max(0.0, float(np.mean(reading.scores.max(axis=1) - centre)))
         logs = shift * (reading.scores - centre[:, None]) / np.maximum(variance, 1e-12)[:, None]
-        weights = np.exp(logs - logs.max(axis=1, keepdims=True))
-        posteriors: Floats = weights / weights.sum(axis=1, keepdims=True)
-        return posteriors
+        return np.asarray(softmax(logs, axis=1))
 
     def window_ratios(self, reading: Reading, decoys: Sequence[Reading]) -> Floats:
         """Log-likelihood ratios (windows, M) under the same law as `posteriors`, each window by itself."""

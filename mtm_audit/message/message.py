@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import logsumexp, softmax
 
 from mtm_audit.message.codewords import Codewords, likeliest_codewords
 from mtm_audit.tracks import Floats
@@ -130,9 +130,7 @@ def _first_frame(candidates: Codewords, framing: Framing, secret: bytes, epochs:
 
 def _log_posteriors(ratios: Floats) -> Floats:
     """Logarithms (L, M) of the symbols' probabilities, each symbol on its own, with room for one that says nothing."""
-    weights = np.exp(ratios - ratios.max(axis=1, keepdims=True))
-    posteriors = weights / weights.sum(axis=1, keepdims=True)
-    return np.asarray(np.log((1.0 - _OUTLIERS) * posteriors + _OUTLIERS / ratios.shape[1]))
+    return np.asarray(np.log((1.0 - _OUTLIERS) * softmax(ratios, axis=1) + _OUTLIERS / ratios.shape[1]))
 
 
 def _posterior(candidates: Codewords, row: int, framing: Framing, layout: Layout, epochs: int) -> float:

@@ -81,6 +81,12 @@ class Scheme:
         """Number of the channel's first axis, counted over all channels in order (the waveform's `c`)."""
         return sum(len(other.axes) for other in self.channels[: self.channels.index(channel)])
 
+    def first_position(self, channel: Channel) -> int:
+        """Position in the message of the first symbol of the channel; 0 when all channels carry the same."""
+        if self.combine == "same":
+            return 0
+        return sum(other.symbols for other in self.channels[: self.channels.index(channel)])
+
     @property
     def message_symbols(self) -> int:
         """L: symbols of a whole message."""

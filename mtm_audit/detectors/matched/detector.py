@@ -4,12 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import softmax
 
 from mtm_audit.detectors.base import ChannelReading, Observation, Reading
 from mtm_audit.detectors.matched.byclock import Found
 from mtm_audit.detectors.matched.correlate import prepare
 from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recording_noise
-from mtm_audit.detectors.matched.evidence import log_sum_exp
 from mtm_audit.detectors.matched.fleet import Member, share_timings
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
 from mtm_audit.detectors.matched.noise import NoiseModel, principal_axes
@@ -90,7 +90,7 @@ class MatchedDetector:
             strengths = np.array([other.evidence for other in searched[row]])
             reading = _reading(codebook, channels[row], row, windows, found, timings[row], float(strengths[0]))
             readings[number] = ChannelReading(
-                reading, _posteriors(reading.scores), reading.window_scores, strengths[1:]
+                reading, softmax(reading.scores, axis=1), reading.window_scores, strengths[1:]
             )
         return readings
 
@@ -130,11 +130,6 @@ def _along_principal_axes(motions: Sequence[Motion]) -> list[Motion]:
 
 def _part_of(progress: Callable[[float], None], row: int, count: int) -> Callable[[float], None]:
     return lambda fraction: progress((row + fraction) / count)
-
-
-def _posteriors(ratios: Floats) -> Floats:
-    """Symbol probabilities from log-likelihood ratios (positions, M), equal odds before."""
-    return np.asarray(np.exp(ratios - log_sum_exp(ratios, axis=1)[:, None]))
 
 
 def _all_windows(

@@ -43,13 +43,11 @@ def _dealt_positions(scheme: Scheme, group: int) -> list[int]:
     """Message positions by time, `group` consecutive windows of a channel at once; what is left over comes last."""
     channels = scheme.channels[:1] if scheme.combine == "same" else scheme.channels
     runs: list[tuple[bool, int, int, list[int]]] = []
-    first = 0
     for index, channel in enumerate(channels):
-        window_ticks = scheme.window_ticks(channel)
+        first, window_ticks = scheme.first_position(channel), scheme.window_ticks(channel)
         for start in range(0, channel.symbols, group):
             run = list(range(first + start, first + min(start + group, channel.symbols)))
             runs.append((len(run) < group, start * window_ticks, index, run))
-        first += channel.symbols
     return [position for *_, run in sorted(runs) for position in run]
 
 

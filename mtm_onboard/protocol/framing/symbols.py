@@ -52,11 +52,5 @@ def check_symbols(symbols: Sequence[int], scheme: Scheme) -> tuple[int, ...]:
 def channel_symbols(symbols: Sequence[int], scheme: Scheme) -> dict[str, tuple[int, ...]]:
     """Each channel's own symbols, in the order in which it plays them (split: consecutive parts; same: all)."""
     message = check_symbols(symbols, scheme)
-    if scheme.combine == "same":
-        return {channel.name: message for channel in scheme.channels}
-    parts: dict[str, tuple[int, ...]] = {}
-    start = 0
-    for channel in scheme.channels:
-        parts[channel.name] = message[start : start + channel.symbols]
-        start += channel.symbols
-    return parts
+    starts = {channel.name: scheme.first_position(channel) for channel in scheme.channels}
+    return {channel.name: message[starts[channel.name] :][: channel.symbols] for channel in scheme.channels}
