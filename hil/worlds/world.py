@@ -1,0 +1,90 @@
+"""What every simulated world gives: rollouts of its task under any noise, and pictures of them."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mtm_audit.recordings.frames import Frame
+from mtm_audit.tracking.registry import Tracker
+from mtm_audit.tracks import Floats
+
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One uninterrupted stretch of a rollout in front of the camera, `first_tick` being the tick that it begins with.
+
+    `times_s` (n + 1,): instants of the frames, one before its first tick and one after each of its n ticks, on the
+    recording's clock; `states` (n + 1, k): where everything is, in columns of the world's own.
+    """
+
+    first_tick: int
+    times_s: Floats
+    states: Floats
+
+
+@dataclass(frozen=True)
+class Conduct:
+    """How a rollout was driven, tick by tick.
+
+    `base` (n, axes) is what the task asked for, `asked` (n, axes) the same with the noise, `sent` (n, axes) what was
+    left of that within the limits; `scores` are the paper's measures of the task, by name.
+    """
+
+    base: Floats
+    asked: Floats
+    sent: Floats
+    scores: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """One run of the task: what the camera saw, in order, and how it was driven (off camera ticks left out)."""
+
+    shots: tuple[Shot, ...]
+    conduct: Conduct
+
+
+class World(Protocol):
+    """A simulated system with its task.
+
+    `axes` name what can carry a signal, `<body>.<axis>`, in the order of the last axis of every noise array. `goals` is
+    the number of goals of the paper's rollouts and `choices` out of how many each is. `task_ticks` is how long a
+    rollout of the paper's task measure takes, `picture_px` width and height of its pictures.
+    """
+
+    name: str
+    rate_hz: float
+    axes: tuple[str, ...]
+    goals: int
+    choices: int
+    task_ticks: int
+    picture_px: tuple[int, int]
+
+    def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
+        """Pursue one goal after the other under noise, in full view: one rollout for each seed.
+
+        `goals` (rollouts, goals) are numbers below `choices`; `noise` (rollouts, goals, ticks, axes) in units of the
+        command, one goal being pursued for that many ticks. The seed decides everything else.
+        """
+        ...
+
+    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[Conduct]:
+        """Do the paper's task once for each seed under `noise` (rollouts, task_ticks, axes), unfilmed."""
+        ...
+
+    def pictures(self, shot: Shot) -> Iterator[Frame]:
+        """The shot as the world's own renderer would show it, drawn by the software camera: blue, green, red."""
+        ...
+
+    def native_pictures(self, shot: Shot) -> Iterator[Frame]:
+        """The shot drawn by the simulator's own renderer; raises MtmError that says what is missing for that."""
+        ...
+
+    def tracker(self) -> Tracker:
+        """The paper's tracker for this world's pictures."""
+        ...
