@@ -182,11 +182,15 @@ def _observed_spectra(glimpse: Glimpse, codebook: Codebook, channel: Channel, on
 
 
 def _axes(channel: Channel, glimpse: Glimpse) -> Glimpse:
-    """The observed axes that stand for the channel's own, in order: the first ones of the track."""
+    """The observed axes that stand for the channel's own, in order: those of their names, or else the first ones."""
     count = len(channel.axes)
     if glimpse.velocities.shape[1] < count:
         raise MtmError(
             f"track {glimpse.name!r} shows {glimpse.velocities.shape[1]} axes but channel {channel.name!r} has {count};"
             " use a tracker that sees them all"
         )
-    return Glimpse(glimpse.name, glimpse.edges_s, glimpse.velocities[:, :count], glimpse.valid, glimpse.axes[:count])
+    # The velocity vx is seen on the axis x.
+    named = [axis if axis in glimpse.axes else axis.removeprefix("v") for axis in channel.axes]
+    columns = [glimpse.axes.index(name) for name in named] if set(named) <= set(glimpse.axes) else list(range(count))
+    axes = tuple(glimpse.axes[column] for column in columns)
+    return Glimpse(glimpse.name, glimpse.edges_s, glimpse.velocities[:, columns], glimpse.valid, axes)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -90,6 +92,18 @@ def test_a_track_with_too_few_axes_is_refused():
     flat = Track("robot0", times_s, np.sin(times_s)[:, None], np.ones(900, dtype=bool), axes=("x",))
     with pytest.raises(MtmError, match="shows 1 axes but channel 'robot0' has 2"):
         read(KEY, glimpse_of_track(flat), 0.0)
+
+
+def test_a_channel_s_axes_are_found_by_name_among_those_of_the_track(glimpse):
+    sideways = Glimpse("robot0", glimpse.edges_s, glimpse.velocities[:, ::-1], glimpse.valid, ("y", "x"))
+    turned = rate_searched_scores(KEY.codebook(), CHANNEL, sideways, 1.0)
+    assert turned == pytest.approx(rate_searched_scores(KEY.codebook(), CHANNEL, glimpse, 1.0))
+
+
+def test_axes_without_a_name_in_common_are_taken_in_order(glimpse):
+    unnamed = replace(glimpse, axes=("first", "second"))
+    taken = rate_searched_scores(KEY.codebook(), CHANNEL, unnamed, 1.0)
+    assert taken == pytest.approx(rate_searched_scores(KEY.codebook(), CHANNEL, glimpse, 1.0))
 
 
 def test_a_detector_that_does_not_exist_is_refused_with_the_ones_that_do():
