@@ -55,7 +55,7 @@ def decode(
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
     tracker: Annotated[
-        str, typer.Option(metavar="NAME", help="How to find robots in a video: aruco, or colour:NAME,...")
+        str, typer.Option(metavar="NAME", help="How to find robots in a video: aruco, colour:NAME,..., brightness.")
     ] = "aruco",
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
@@ -112,7 +112,7 @@ def learn_profile(
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
     tracker: Annotated[
-        str, typer.Option(metavar="NAME", help="How to find robots in a video: aruco, or colour:NAME,...")
+        str, typer.Option(metavar="NAME", help="How to find robots in a video: aruco, colour:NAME,..., brightness.")
     ] = "aruco",
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")

@@ -8,7 +8,9 @@ from mtm_audit.tracking.gather import Progress
 from mtm_audit.tracks import Track
 from mtm_onboard.protocol.errors import MtmError
 
-TRACKERS = "aruco, aruco:mirrored, colour:<name or #rrggbb>[,<another>...]"
+TRACKERS = (
+    "aruco, aruco:mirrored, colour:<name or #rrggbb>[,<another>...], brightness[:<x0>,<y0>,<x1>,<y1>[,<threshold>]]"
+)
 
 
 class Tracker(Protocol):
@@ -22,7 +24,7 @@ class Tracker(Protocol):
 
 
 def tracker(name: str) -> Tracker:
-    """The tracker of that name: `aruco`, `aruco:mirrored` or `colour:red,#00ffff`; raises MtmError for others."""
+    """The tracker of that name, such as `aruco` or `colour:red,#00ffff` (`TRACKERS`); raises MtmError for others."""
     kind, _, choice = name.partition(":")
     if kind == "aruco" and choice in ("", "mirrored"):
         from mtm_audit.tracking.aruco import ArucoTracker
@@ -32,4 +34,8 @@ def tracker(name: str) -> Tracker:
         from mtm_audit.tracking.colour import ColourTracker
 
         return ColourTracker(tuple(part.strip() for part in choice.split(",")))
+    if kind == "brightness":
+        from mtm_audit.tracking.brightness import parse_brightness
+
+        return parse_brightness(choice)
     raise MtmError(f"there is no tracker {name!r}; choose one of: {TRACKERS}")
