@@ -19,6 +19,8 @@ from mtm_audit.tracks import Floats
 PADS_X_M = np.linspace(4.5, 15.5, 8)
 # High enough that neither terrain (up to 6.6 m) nor flags share the upper rows of the picture with the lander.
 HOVER_Y_M = 10.0
+# The part of the picture into which neither terrain nor flags reach, as left, upper, right and lower edge.
+SKY_PX = (0, 0, 600, 200)
 WARM_UP_TICKS = 150
 
 # Columns of a shot's states: the terrain's heights, then x, y and angle of the lander and of its two legs, then x, y
@@ -77,8 +79,10 @@ class LunarLander:
         return rendered(shot)
 
     def tracker(self) -> Tracker:
-        """Centroid of bright pixels above the terrain, smoothed by a constant-velocity Kalman filter."""
-        raise NotImplementedError
+        """Centroid of what is bright above terrain and flags, smoothed by a constant-velocity Kalman filter."""
+        from mtm_audit.tracking.brightness import BrightnessTracker
+
+        return BrightnessTracker(SKY_PX)
 
 
 def hover_action(body: lunar_lander.Box2D.b2Body, pad_x_m: float) -> tuple[float, float]:

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -72,8 +73,7 @@ def _pose(environment: lunar_lander.LunarLander, state: Floats) -> None:
     width_m, height_m = WIDTH_PX / PX_PER_M, HEIGHT_PX / PX_PER_M
     points = list(zip(np.linspace(0.0, width_m, TERRAIN_POINTS).tolist(), state[:TERRAIN_POINTS].tolist(), strict=True))
     environment.sky_polys = [
-        [left, right, (right[0], height_m), (left[0], height_m)]
-        for left, right in zip(points[:-1], points[1:], strict=True)
+        [left, right, (right[0], height_m), (left[0], height_m)] for left, right in pairwise(points)
     ]
     bodies, flames = _parts(state)
     for body, (x_m, y_m, angle_rad) in zip(environment.drawlist, bodies.tolist(), strict=True):
