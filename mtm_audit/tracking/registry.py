@@ -8,8 +8,13 @@ from mtm_audit.tracking.gather import Progress
 from mtm_audit.tracks import Track
 from mtm_onboard.protocol.errors import MtmError
 
-TRACKERS = (
-    "aruco, aruco:mirrored, colour:<name or #rrggbb>[,<another>...], brightness[:<x0>,<y0>,<x1>,<y1>[,<threshold>]]"
+TRACKERS = ", ".join(
+    [
+        "aruco",
+        "aruco:mirrored",
+        "colour:<name, #rrggbb or hsv(H-H,S-S,V-V)>[,<another>...]",
+        "brightness[:<x0>,<y0>,<x1>,<y1>[,<threshold>]]",
+    ]
 )
 
 
@@ -32,8 +37,9 @@ def tracker(name: str) -> Tracker:
         return ArucoTracker(mirrored=True if choice else None)
     if kind == "colour" and choice:
         from mtm_audit.tracking.colour import ColourTracker
+        from mtm_audit.tracking.cover import split_colours
 
-        return ColourTracker(tuple(part.strip() for part in choice.split(",")))
+        return ColourTracker(split_colours(choice))
     if kind == "brightness":
         from mtm_audit.tracking.brightness import parse_brightness
 
