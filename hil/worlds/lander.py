@@ -97,14 +97,14 @@ def hover_action(body: lunar_lander.Box2D.b2Body, pad_x_m: float) -> tuple[float
     return min(max(side, -1.0), 1.0), min(max(main, -1.0), 1.0)
 
 
-LEAN_PER_M = 0.05
+LEAN_PER_M = 0.03
 LEAN_PER_MPS = 0.1
 MOST_LEAN = 0.3
-TURN_PER_RAD = 3.0
-TURN_PER_RADPS = 2.0
+TURN_PER_RAD = 10.0
+TURN_PER_RADPS = 1.0
 HOVER_THROTTLE = 0.25
-LIFT_PER_M = 0.15
-LIFT_PER_MPS = 0.2
+LIFT_PER_M = 0.5
+LIFT_PER_MPS = 0.5
 
 
 def _rollout(environment: lunar_lander.LunarLander, pads: Integers, noise: Floats, seed: int) -> Rollout:
