@@ -1,0 +1,172 @@
+"""The paper's Reacher: an arm of two links goes from target to target under a stochastic policy.
+
+Gymnasium's Reacher-v5 (its own model file, MuJoCo's physics, two steps of 10 ms a tick: 50 Hz) and a policy trained by
+soft actor-critic. The policy's action is tanh(mean + std * eps) with eps standard normal, mean and std both functions
+of the observation; the keyed noise takes the place of eps. The paper's sigma = 1.0 is read as this unit variance: the
+return that it reports cannot be had with torque noise of standard deviation 1, whose penalty alone, 0.1 per squared
+unit in either joint, takes 10 off in 50 steps.
+"""
+
+from collections.abc import Iterator, Sequence
+from importlib import resources
+
+import mujoco
+import numpy as np
+
+from hil.worlds.reacher_pictures import drawn_pictures, rendered_pictures
+from hil.worlds.reacher_policy import trained_policy
+from hil.worlds.world import Conduct, Integers, Rollout, Shot
+from mtm_audit.recordings.frames import Frame
+from mtm_audit.tracking.registry import Tracker
+from mtm_audit.tracks import Floats
+
+TARGET_RING_M = 0.14
+TARGET_REACH_M = 0.20
+
+_FRAME_SKIP = 2
+_ACTION_WEIGHT = 0.1
+_POSE_BOUNDS_RAD = (np.pi, 2.5)
+_RESET_RAD = 0.1
+_RESET_RADPS = 0.005
+# Streams of random numbers of one seed, so that the start is the same whatever the noise.
+_START, _NOISE = 0, 1
+
+
+class Reacher:
+    """The arm; goals are eight targets on a ring, counter-clockwise from +x.
+
+    States are inner and outer joint angle (rad) and the target's x and y (m). An axis without noise in a whole
+    rollout is no axis without noise: the policy is a Gaussian one, and its eps is then drawn white from the seed. In
+    a rollout's conduct, `base` is tanh(mean), `asked` is mean + std * eps, and `sent` is tanh of that: nothing is
+    clamped, but large actions are squashed towards 1, full torque.
+    """
+
+    name = "reacher"
+    rate_hz = 50.0
+    axes: tuple[str, ...] = ("arm.inner", "arm.outer")
+    goals = 8
+    choices = 8
+    task_ticks = 50
+    picture_px = (480, 480)
+
+    def __init__(self) -> None:
+        text = resources.files("gymnasium").joinpath("envs/mujoco/assets/reacher.xml").read_text()
+        self._model = mujoco.MjModel.from_xml_string(text)
+        self._bodies = [self._model.body(name).id for name in ("fingertip", "target")]
+        self._policy = trained_policy()
+
+    def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
+        """Go to one target after the other without a break, from a pose of the seed: one shot for each seed.
+
+        `goals` (rollouts, goals), `noise` (rollouts, goals, ticks, axes) in units of the policy's own standard
+        deviation. Score: the mean distance between fingertip and target at the end of each goal's time.
+        """
+        arms = [self._posed_arm(seed) for seed in seeds]
+        ticks = noise.shape[2]
+        eps = _policy_noise(noise.reshape(len(seeds), -1, len(self.axes)), seeds)
+        angles_rad = goals * (2 * np.pi / self.choices)
+        targets_m = TARGET_RING_M * np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1)
+
+        for arm, target_m in zip(arms, targets_m[:, 0], strict=True):
+            self._aim(arm, target_m)
+        states = [np.stack([arm.qpos for arm in arms])]
+        driven = []
+        misses_m = np.empty(goals.shape)
+        for goal in range(goals.shape[1]):
+            for arm, target_m in zip(arms, targets_m[:, goal], strict=True):
+                self._aim(arm, target_m)
+            for tick in range(goal * ticks, (goal + 1) * ticks):
+                driven.append(self._tick(arms, eps[:, tick]))
+                states.append(np.stack([arm.qpos for arm in arms]))
+            misses_m[:, goal] = [self._miss_m(arm) for arm in arms]
+
+        times_s = np.arange(len(states)) / self.rate_hz
+        paths, conducts = np.stack(states, axis=1), np.stack(driven, axis=2)
+        return [
+            Rollout((Shot(0, times_s, path),), Conduct(*conduct, {"final distance (m)": float(miss_m.mean())}))
+            for path, conduct, miss_m in zip(paths, np.moveaxis(conducts, 1, 0), misses_m, strict=True)
+        ]
+
+    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[Conduct]:
+        """Fifty steps from near the rest pose to a target of the seed, within 0.20 m in each axis.
+
+        `noise` is (rollouts, 50, axes). Score: the return, the sum of -|fingertip - target| - 0.1 |action|^2.
+        """
+        arms = [self._resting_arm(seed) for seed in seeds]
+        eps = _policy_noise(noise, seeds)
+        driven = []
+        returns = np.zeros(len(seeds))
+        for tick in range(noise.shape[1]):
+            driven.append(self._tick(arms, eps[:, tick]))
+            returns -= [self._miss_m(arm) for arm in arms]
+            returns -= _ACTION_WEIGHT * np.square(driven[-1][2]).sum(axis=1)
+        conducts = np.moveaxis(np.stack(driven, axis=2), 1, 0)
+        return [
+            Conduct(*conduct, {"50-step return": float(total)})
+            for conduct, total in zip(conducts, returns, strict=True)
+        ]
+
+    def pictures(self, shot: Shot) -> Iterator[Frame]:
+        """The shot seen from above, drawn by the software camera."""
+        return drawn_pictures(shot)
+
+    def native_pictures(self, shot: Shot) -> Iterator[Frame]:
+        """The shot seen from above, drawn by MuJoCo; raises MtmError when there is no OpenGL to draw with."""
+        return rendered_pictures(self._model, shot)
+
+    def tracker(self) -> Tracker:
+        """The segmentation of both links by hue: one track of their joint angles."""
+        from mtm_audit.tracking.arms import ArmTracker
+
+        return ArmTracker()
+
+    def _posed_arm(self, seed: int) -> mujoco.MjData:
+        draw = np.random.default_rng([seed, _START])
+        arm = mujoco.MjData(self._model)
+        arm.qpos[:2] = draw.uniform(np.negative(_POSE_BOUNDS_RAD), _POSE_BOUNDS_RAD)
+        return arm
+
+    def _resting_arm(self, seed: int) -> mujoco.MjData:
+        draw = np.random.default_rng([seed, _START])
+        arm = mujoco.MjData(self._model)
+        arm.qpos[:2] = draw.uniform(-_RESET_RAD, _RESET_RAD, 2)
+        arm.qvel[:2] = draw.uniform(-_RESET_RADPS, _RESET_RADPS, 2)
+        self._aim(arm, draw.uniform(-TARGET_REACH_M, TARGET_REACH_M, 2))
+        return arm
+
+    def _aim(self, arm: mujoco.MjData, target_xy_m: Floats) -> None:
+        arm.qpos[2:] = target_xy_m
+        mujoco.mj_forward(self._model, arm)
+
+    def _tick(self, arms: Sequence[mujoco.MjData], eps: Floats) -> tuple[Floats, Floats, Floats]:
+        """One control period of all arms; the means' actions, the actions before and after tanh: (arms, axes) each."""
+        mean, std = self._policy.distribution(np.stack([self._observation(arm) for arm in arms]))
+        asked = mean + std * eps
+        sent = np.tanh(asked)
+        for arm, action in zip(arms, sent, strict=True):
+            arm.ctrl[:] = action
+            mujoco.mj_step(self._model, arm, nstep=_FRAME_SKIP)
+        return np.tanh(mean), asked, sent
+
+    def _observation(self, arm: mujoco.MjData) -> Floats:
+        """What Reacher-v5 observes, (10,)."""
+        joints_rad = arm.qpos[:2]
+        observed: Floats = np.concatenate(
+            [np.cos(joints_rad), np.sin(joints_rad), arm.qpos[2:], arm.qvel[:2], self._offset_m(arm)]
+        )
+        return observed
+
+    def _offset_m(self, arm: mujoco.MjData) -> Floats:
+        # As in Reacher-v5 the places of a step's last evaluation, not of its end, which the angles belong to.
+        fingertip, target = self._bodies
+        offset: Floats = (arm.xpos[fingertip] - arm.xpos[target])[:2]
+        return offset
+
+    def _miss_m(self, arm: mujoco.MjData) -> float:
+        return float(np.linalg.norm(self._offset_m(arm)))
+
+
+def _policy_noise(noise: Floats, seeds: Sequence[int]) -> Floats:
+    """`noise` (rollouts, ticks, axes) with white noise of the seed on the axes that have none in their rollout."""
+    white = np.stack([np.random.default_rng([seed, _NOISE]).standard_normal(noise.shape[1:]) for seed in seeds])
+    return np.where(noise.any(axis=1, keepdims=True), noise, white)
