@@ -14,6 +14,7 @@ TRACKERS = ", ".join(
         "aruco:mirrored",
         "colour:<name, #rrggbb or hsv(H-H,S-S,V-V)>[,<another>...]",
         "brightness[:<x0>,<y0>,<x1>,<y1>[,<threshold>]]",
+        "arms[:<inner colour>,<outer colour>]",
     ]
 )
 
@@ -44,4 +45,8 @@ def tracker(name: str) -> Tracker:
         from mtm_audit.tracking.brightness import parse_brightness
 
         return parse_brightness(choice)
+    if kind == "arms":
+        from mtm_audit.tracking.arms import parse_arms
+
+        return parse_arms(choice)
     raise MtmError(f"there is no tracker {name!r}; choose one of: {TRACKERS}")
