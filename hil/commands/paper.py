@@ -1,12 +1,55 @@
 """`mtm-hil paper`: the paper's tables, measured here."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
 
+from hil.experiments import world_conduct, world_report
 from hil.experiments.cells import CellStore
 from hil.experiments.paper_robomaster import measure, rich_table, write_csv
+from hil.experiments.world_remarks import REMARKS
+from hil.experiments.world_rollout import NATIVE, SOFTWARE
+from hil.experiments.world_tables import Condition, Effort, Row, conditions_of, null_conditions_of
+from hil.experiments.world_tables import measure as measure_world
 from hil.robots.mecanum import calibrated_parameters
+from hil.worlds.registry import NAMES, make_world
+from mtm_onboard.protocol import MtmError
+
+# Points other than the headline's scheme take a sixth of the rollouts; one rollout of Football tries one of its 64
+# strategies, so that its rollouts come in such numbers.
+_PART = 6
+_STRATEGIES = 64
+_FOOTBALL_PART = 10
+_QUICK_ROLLOUTS = 2
+
+
+@dataclass(frozen=True)
+class WorldOptions:
+    """What the command line asked of the simulated worlds; `out` a CSV file, or a folder for several."""
+
+    rollouts: int
+    quick: bool
+    first_seed: int
+    renderer: str
+    workers: int | None
+    out: Path | None
+    cells: Path
+
+    def effort(self, world: str) -> Effort:
+        """How much to measure in a world."""
+        count = _QUICK_ROLLOUTS if self.quick else self.rollouts
+        headline, others = count, max(2, count // _PART)
+        if world == "football" and not self.quick:
+            headline, others = _STRATEGIES * max(1, count // _FOOTBALL_PART), _STRATEGIES
+        return Effort(headline, others, self.first_seed, self.renderer, self.quick)
+
+    def command(self, what: str) -> str:
+        """The command line."""
+        parts = [f"mtm-hil paper {what}", "--quick" if self.quick else f"-n {self.rollouts}"]
+        parts += [f"--seed {self.first_seed}", f"--renderer {self.renderer}"]
+        return " ".join([*parts, f"--out {self.out}"])
 
 
 def paper_robomaster(rollouts: int, out: Path | None, cells: Path, console: Console) -> None:
@@ -19,3 +62,83 @@ def paper_robomaster(rollouts: int, out: Path | None, cells: Path, console: Cons
         command = f"mtm-hil paper robomaster -n {rollouts} --out {out}"
         write_csv(out, rows, (command, f"{plant}"))
         print(f"wrote {out}")
+
+
+def paper_table(name: str, options: WorldOptions, console: Console) -> None:
+    """The table of that name: a world's, or `null`, `performance` or `all`; raises MtmError for a wrong renderer."""
+    if options.renderer not in (SOFTWARE, NATIVE):
+        raise MtmError(f"there is no renderer {options.renderer!r}; choose {SOFTWARE} or {NATIVE}")
+    whole = {"null": paper_null, "performance": paper_performance, "all": paper_all}
+    if name in whole:
+        whole[name](options, console)
+    else:
+        paper_world(name, options, console)
+
+
+def paper_world(world: str, options: WorldOptions, console: Console) -> None:
+    """Measure, print and, where asked, write the tables of one world."""
+    make_world(world)
+    with CellStore(options.cells) as store:
+        rows, seconds = _measured(world, options, conditions_of(world, options.effort(world)), store, console)
+    console.print(world_report.rich_table(world, rows))
+    if options.out is not None:
+        _write_world(options.out, world, options.command(world), rows, seconds)
+
+
+def paper_all(options: WorldOptions, console: Console) -> None:
+    """All tables of the simulated worlds, in a folder where asked."""
+    _check_simulators()
+    folder = options.out
+    if folder is not None and not folder.is_dir():
+        raise MtmError(f"{folder} is no folder; make it, or name another")
+    parts = {"null": paper_null, "performance": paper_performance}
+    for name in (*NAMES, *parts):
+        own = replace(options, out=None if folder is None else folder / f"{name}.csv")
+        if name in parts:
+            parts[name](own, console)
+        else:
+            paper_world(name, own, console)
+
+
+def paper_null(options: WorldOptions, console: Console) -> None:
+    """Measure and print the null conditions of all worlds, and write them where asked."""
+    _check_simulators()
+    tables: list[tuple[str, list[Row]]] = []
+    with CellStore(options.cells) as store:
+        for world in NAMES:
+            rows, _ = _measured(world, options, null_conditions_of(world, options.effort(world)), store, console)
+            tables.append((world, rows))
+            console.print(world_report.rich_table(world, rows))
+    if options.out is not None:
+        world_report.write_null_csv(options.out, tables, (options.command("null"),))
+        print(f"wrote {options.out}")
+
+
+def paper_performance(options: WorldOptions, console: Console) -> None:
+    """Measure and print what the noise costs the tasks of all worlds, and write it where asked."""
+    _check_simulators()
+    rollouts = _QUICK_ROLLOUTS if options.quick else options.rollouts
+    with CellStore(options.cells) as store:
+        rows = world_conduct.measure(NAMES, rollouts, options.first_seed, store, console, options.workers)
+    console.print(world_conduct.rich_table(rows))
+    if options.out is not None:
+        world_conduct.write_csv(options.out, rows, (options.command("performance"),))
+        print(f"wrote {options.out}")
+
+
+def _measured(
+    world: str, options: WorldOptions, conditions: Sequence[Condition], store: CellStore, console: Console
+) -> tuple[list[Row], float]:
+    return measure_world(world, options.effort(world), conditions, store, console, options.workers)
+
+
+def _write_world(path: Path, world: str, command: str, rows: Sequence[Row], seconds: float) -> None:
+    took = f"its cells took {seconds / 60:.0f} minutes of one core"
+    world_report.write_csv(path, rows, (command, took, *REMARKS[world]))
+    print(f"wrote {path}")
+
+
+def _check_simulators() -> None:
+    """Fail before anything is computed when a simulator is missing."""
+    for world in NAMES:
+        make_world(world)

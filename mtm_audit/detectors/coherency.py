@@ -59,7 +59,7 @@ class CoherencyDetector:
         """Score every window; without an onset, GCC-PHAT finds one for each codebook at each candidate rate."""
         scheme = codebooks[0].scheme
         ticks = scheme.window_ticks(channel)
-        axes = _axes(channel, glimpse)
+        axes = own_axes(channel, glimpse)
         if isinstance(onset, int | float):
             timing = Timing(onset, scheme.rate_hz)
             return self._score_group(codebooks, [timing] * len(codebooks), channel, axes, searched=False)
@@ -128,7 +128,7 @@ def rate_searched_scores(
     codebook: Codebook, channel: Channel, glimpse: Glimpse, onset_s: float, window: int = 0
 ) -> Floats:
     """The paper's score of each candidate in one window: best mean coherency over the 101 rates, shape (M,)."""
-    observed = _observed_spectra(_axes(channel, glimpse), codebook, channel, onset_s, window)
+    observed = _observed_spectra(own_axes(channel, glimpse), codebook, channel, onset_s, window)
     best: Floats = mean_coherency(_reference_spectra([codebook], channel, window)[0], observed).max(axis=1)
     return best
 
@@ -181,8 +181,11 @@ def _observed_spectra(glimpse: Glimpse, codebook: Codebook, channel: Channel, on
     return segment_spectra(observed, codebook.bins(channel))
 
 
-def _axes(channel: Channel, glimpse: Glimpse) -> Glimpse:
-    """The observed axes that stand for the channel's own, in order: those of their names, or else the first ones."""
+def own_axes(channel: Channel, glimpse: Glimpse) -> Glimpse:
+    """The observed axes that stand for the channel's own, in order: those of their names, or else the first ones.
+
+    Raises MtmError when the track has fewer axes than the channel.
+    """
     count = len(channel.axes)
     if glimpse.velocities.shape[1] < count:
         raise MtmError(

@@ -1,0 +1,159 @@
+"""The paper's tables of a simulated world, measured here, cell by cell."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from rich.console import Console
+
+from hil.experiments.cells import Cell, CellStore, Values
+from hil.experiments.paper_robomaster import Proportion
+from hil.experiments.sweep import run_sweep
+from hil.experiments.world_points import HEADLINES, PaperCell, Point, headline_point, paper_cells
+from hil.experiments.world_reading import COHERENCY, MATCHED
+from hil.experiments.world_rollout import (
+    DECOYS,
+    FILE,
+    MEMORY,
+    NO_MESSAGE,
+    SECONDS,
+    SENT,
+    SOFTWARE,
+    decode_batch,
+    rollout_parameters,
+)
+
+DETECTORS = (COHERENCY, MATCHED)
+WRONG_KEY = "wrong key"
+THROUGH_A_FILE = "from a file"
+# Rollouts that one process takes at once: enough for a simulator that steps them together, few enough to be stopped.
+_BATCH = {"discovery": 10, "lunar-lander": 2, "reacher": 2, "football": 16}
+# Channels that are read from the recordings of "same" as well, since there each body or axis moves by itself.
+_PARTS = {"discovery": ("x",), "football": ("agent0",)}
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much to measure: rollouts at the headline's scheme, and at all other points, from `first_seed` on.
+
+    `quick` leaves the headline point alone, with the shortest messages of the largest alphabet beside it.
+    """
+
+    headline_rollouts: int
+    other_rollouts: int
+    first_seed: int
+    renderer: str = SOFTWARE
+    quick: bool = False
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What is recorded: a point, how many rollouts, and what is special about them."""
+
+    point: Point
+    rollouts: int
+    arm: str = SENT
+    decoys: int = 0
+    frames: str = MEMORY
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one detector has right at one point.
+
+    `arm` is what was sent and tried; `goals` are whole messages, None in the null conditions, `symbols` single ones;
+    `paper` is None where the paper has no such point.
+    """
+
+    arm: str
+    point: Point
+    detector: str
+    rollouts: int
+    goals: Proportion | None
+    symbols: Proportion
+    margin: float | None = None
+    paper: PaperCell | None = None
+
+
+def conditions_of(world: str, effort: Effort) -> list[Condition]:
+    """What to record in a world: the paper's points, shorter messages, and the headline point in special ways."""
+    headline = headline_point(world)
+    points = [cell.point for cell in paper_cells(world) if cell.point.arrangement not in _PARTS.get(world, ())]
+    shorter = [headline_point(world, ticks) for ticks in HEADLINES[world].shorter_ticks]
+    if effort.quick:
+        shortest = min(point.message_ticks for point in points)
+        points, shorter = [headline_point(world, shortest)], []
+    rollouts = dict.fromkeys(points, effort.other_rollouts)
+    rollouts |= dict.fromkeys([*shorter, headline], effort.headline_rollouts)
+    found = [Condition(point, count, decoys=DECOYS if point == headline else 0) for point, count in rollouts.items()]
+    found.append(Condition(headline, effort.headline_rollouts, arm=NO_MESSAGE))
+    found.append(Condition(headline, min(_BATCH[world], effort.headline_rollouts), frames=FILE))
+    return found
+
+
+def null_conditions_of(world: str, effort: Effort) -> list[Condition]:
+    """The headline point, with wrong keys and without a message."""
+    return [condition for condition in conditions_of(world, effort) if condition.decoys or condition.arm == NO_MESSAGE]
+
+
+def measure(
+    world: str,
+    effort: Effort,
+    conditions: Sequence[Condition],
+    store: CellStore,
+    console: Console,
+    workers: int | None = None,
+) -> tuple[list[Row], float]:
+    """Record and read a world under the conditions; beside the rows the processor time that all of it took, seconds."""
+    groups = [_cells(world, condition, effort) for condition in conditions]
+    results = run_sweep(decode_batch, [cell for group in groups for cell in group], store, console, workers)
+    taken = iter(results)
+    rows: list[Row] = []
+    for condition, group in zip(conditions, groups, strict=True):
+        rows += _rows(world, condition, _joined([next(taken) for _ in group]))
+    return rows, sum(float(result[SECONDS]) for result in results)
+
+
+def _cells(world: str, condition: Condition, effort: Effort) -> list[Cell]:
+    size = _BATCH[world]
+    parts = _PARTS.get(world, ()) if condition.point.arrangement == "same" else ()
+    return [
+        Cell(
+            "worlds",
+            rollout_parameters(
+                condition.point, min(size, condition.rollouts - first), DETECTORS, arm=condition.arm,
+                decoys=condition.decoys, parts=parts, renderer=effort.renderer, frames=condition.frames,
+            ),
+            effort.first_seed + first,
+        )
+        for first in range(0, condition.rollouts, size)
+    ]  # fmt: skip
+
+
+def _joined(results: Sequence[Values]) -> dict[str, list[float]]:
+    """The lists of all batches, one after the other."""
+    names = [name for name in results[0] if name != SECONDS]
+    return {name: [value for result in results for value in json.loads(str(result[name]))] for name in names}
+
+
+def _rows(world: str, condition: Condition, results: dict[str, list[float]]) -> Iterator[Row]:
+    recorded = condition.point
+    paper = {cell.point: cell for cell in paper_cells(world)}
+    arm = THROUGH_A_FILE if condition.frames == FILE else condition.arm
+    for name in [name for name in results if name.endswith(" goals")]:
+        detector, arrangement, _ = name.split(" ")
+        point = recorded.of_arrangement(arrangement)
+        own = {what: results[f"{detector} {arrangement} {what}"] for what in ("goals", "symbols", "margin")}
+        trials = condition.rollouts * point.goals
+        symbols = Proportion(int(sum(own["symbols"])), trials * point.goal_symbols)
+        margin = sum(own["margin"]) / condition.rollouts
+        if condition.arm == NO_MESSAGE:
+            yield Row(arm, point, detector, condition.rollouts, None, symbols)
+            continue
+        goals = Proportion(int(sum(own["goals"])), trials)
+        reported = paper.get(point) if arm == SENT else None
+        yield Row(arm, point, detector, condition.rollouts, goals, symbols, margin, reported)
+        if condition.decoys:
+            wrong = int(sum(results[f"{detector} {arrangement} wrong"]))
+            tried = Proportion(wrong, symbols.trials * condition.decoys)
+            yield Row(WRONG_KEY, point, detector, condition.rollouts, None, tried)
