@@ -22,12 +22,17 @@ class ColourTracker:
     """Follows the largest patch of each of `colours` (names, `#rrggbb` or `hsv(H-H,S-S,V-V)`).
 
     The background may be any gray: a pixel's weight is how far it is from gray towards the colour, so pixels on an
-    edge count by the part that the patch covers.
+    edge count by the part that the patch covers. Around the last place is searched first, and every
+    `search_every` frames in the whole picture. A patch smaller than `least_share` of what is usual for its colour is
+    partly covered, and not valid: its middle is not that of the whole.
     """
 
     pixels: Literal["gray", "bgr"] = "bgr"
 
-    def __init__(self, colours: tuple[str, ...]) -> None:
+    def __init__(
+        self, colours: tuple[str, ...], search_every: int = FULL_SEARCH_EVERY, least_share: float = 0.0
+    ) -> None:
+        self._search_every, self._least_share = search_every, least_share
         self._covers = {name: cover_of(name) for name in colours}
 
     def track(self, frames: Iterable[Frame], progress: Progress | None = None) -> list[Track]:
@@ -37,25 +42,32 @@ class ColourTracker:
         """
         gather = Gather()
         windows: dict[str, Window] = {}
+        areas: dict[str, list[float]] = {name: [] for name in self._covers}
         for number, frame in enumerate(steady(frames, progress)):
             gather.next_frame(frame)
             for name, cover in self._covers.items():
                 window = windows.pop(name, None)
-                patch = _patch(frame.image, cover, window) if window and number % FULL_SEARCH_EVERY else None
+                patch = _patch(frame.image, cover, window) if window and number % self._search_every else None
                 patch = patch or _patch(frame.image, cover, (slice(0, None), slice(0, None)))
                 if patch is not None:
-                    column, row, windows[name] = patch
+                    column, row, area, windows[name] = patch
                     gather.put(name, column, row)
+                    areas[name].append(area)
         if not gather.seen:
             raise MtmError(
                 f"none of {', '.join(self._covers)} found in {len(gather.times_s)} frames; name the colour that the "
                 "robot has in the picture, for instance as #rrggbb"
             )
+        for name, sightings in gather.seen.items():
+            least = self._least_share * float(np.median(areas[name]))
+            for row_number, area in zip(list(sightings), areas[name], strict=True):
+                if area < least:
+                    del sightings[row_number]
         return gather.tracks(with_headings=False)
 
 
-def _patch(image: Image, cover_in: Cover, window: Window) -> tuple[float, float, Window] | None:
-    """Column, row and surroundings of the largest patch of a colour inside the window; None when there is none."""
+def _patch(image: Image, cover_in: Cover, window: Window) -> tuple[float, float, float, Window] | None:
+    """Column, row, area and surroundings of the largest patch of a colour inside the window; None when none is."""
     upper, left = window[0].start, window[1].start
     cover = cover_in(image[window])
     count, labels, boxes, _ = cv2.connectedComponentsWithStats((cover > COVERED).astype(np.uint8), connectivity=8)
@@ -75,4 +87,4 @@ def _patch(image: Image, cover_in: Cover, window: Window) -> tuple[float, float,
     column = left + columns.start + float(weights.sum(axis=0) @ np.arange(weights.shape[1]) / total)
     row = upper + rows.start + float(weights.sum(axis=1) @ np.arange(weights.shape[0]) / total)
     top, start = max(upper + y - height, 0), max(left + x - width, 0)
-    return column, row, (slice(top, upper + y + 2 * height), slice(start, left + x + 2 * width))
+    return column, row, float(total), (slice(top, upper + y + 2 * height), slice(start, left + x + 2 * width))

@@ -15,6 +15,7 @@ TRACKERS = ", ".join(
         "colour:<name, #rrggbb or hsv(H-H,S-S,V-V)>[,<another>...]",
         "brightness[:<x0>,<y0>,<x1>,<y1>[,<threshold>]]",
         "arms[:<inner colour>,<outer colour>]",
+        "football[:<colour>,...]",
     ]
 )
 
@@ -49,4 +50,8 @@ def tracker(name: str) -> Tracker:
         from mtm_audit.tracking.arms import parse_arms
 
         return parse_arms(choice)
+    if kind == "football":
+        from mtm_audit.tracking.football import parse_football
+
+        return parse_football(choice)
     raise MtmError(f"there is no tracker {name!r}; choose one of: {TRACKERS}")
