@@ -293,7 +293,7 @@ _Rollouts = Annotated[
     int,
     typer.Option("-n", min=1, help="Rollouts at the headline's scheme, Football 64 for each ten; others take a part."),
 ]
-_Quick = Annotated[bool, typer.Option("--quick", help="Two rollouts of a few points, for a first look.")]
+_Quick = Annotated[bool, typer.Option("--quick", help="One rollout of a few points, for a first look.")]
 _Seed = Annotated[int, typer.Option(min=0, help="The first rollout's seed.")]
 _Renderer = Annotated[str, typer.Option(help="Who draws the pictures: software, or native (the simulator itself).")]
 _Workers = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")]

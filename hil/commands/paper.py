@@ -17,12 +17,12 @@ from hil.robots.mecanum import calibrated_parameters
 from hil.worlds.registry import NAMES, make_world
 from mtm_onboard.protocol import MtmError
 
-# Points other than the headline's scheme take a sixth of the rollouts; one rollout of Football tries one of its 64
+# Points other than the headline's scheme take a tenth of the rollouts; one rollout of Football tries one of its 64
 # strategies, so that its rollouts come in such numbers.
-_PART = 6
+_PART = 10
 _STRATEGIES = 64
 _FOOTBALL_PART = 10
-_QUICK_ROLLOUTS = 2
+_QUICK_ROLLOUTS = 1
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class WorldOptions:
     def effort(self, world: str) -> Effort:
         """How much to measure in a world."""
         count = _QUICK_ROLLOUTS if self.quick else self.rollouts
-        headline, others = count, max(2, count // _PART)
+        headline, others = count, max(1, count // _PART)
         if world == "football" and not self.quick:
             headline, others = _STRATEGIES * max(1, count // _FOOTBALL_PART), _STRATEGIES
         return Effort(headline, others, self.first_seed, self.renderer, self.quick)
