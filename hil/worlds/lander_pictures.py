@@ -64,7 +64,7 @@ def _rendered(shot: Shot) -> Iterator[Frame]:
     environment.reset(seed=0)
     for time_s, state in zip(shot.times_s, shot.states, strict=True):
         _pose(environment, state)
-        image = np.asarray(environment.render())[..., ::-1]
+        image = np.asarray(environment.render())[..., ::-1]  # type: ignore[no-untyped-call]
         yield Frame(float(time_s), np.ascontiguousarray(image))
 
 
@@ -78,9 +78,9 @@ def _pose(environment: lunar_lander.LunarLander, state: Floats) -> None:
     bodies, flames = _parts(state)
     for body, (x_m, y_m, angle_rad) in zip(environment.drawlist, bodies.tolist(), strict=True):
         body.position, body.angle = (x_m, y_m), angle_rad
-    environment._clean_particles(True)
+    environment._clean_particles(True)  # type: ignore[no-untyped-call]
     for x_m, y_m, life in flames.tolist():
-        environment._create_particle(1.0, x_m, y_m, life + 0.15)
+        environment._create_particle(1.0, x_m, y_m, life + 0.15)  # type: ignore[no-untyped-call]
 
 
 def _parts(state: Floats) -> tuple[Floats, Floats]:
