@@ -81,11 +81,10 @@ class Reacher:
             misses_m[:, goal] = [self._miss_m(arm) for arm in arms]
 
         times_s = np.arange(len(states)) / self.rate_hz
-        paths, conducts = np.stack(states, axis=1), np.stack(driven, axis=2)
-        return [
-            Rollout((Shot(0, times_s, path),), Conduct(*conduct, {"final distance (m)": float(miss_m.mean())}))
-            for path, conduct, miss_m in zip(paths, np.moveaxis(conducts, 1, 0), misses_m, strict=True)
-        ]
+        shots = [Shot(0, times_s, path) for path in np.stack(states, axis=1)]
+        scores = [{"final distance (m)": float(miss_m.mean())} for miss_m in misses_m]
+        conducts = _conducts(driven, scores)
+        return [Rollout((shot,), conduct) for shot, conduct in zip(shots, conducts, strict=True)]
 
     def perform(self, noise: Floats, seeds: Sequence[int]) -> list[Conduct]:
         """Fifty steps from near the rest pose to a target of the seed, within 0.20 m in each axis.
@@ -100,11 +99,7 @@ class Reacher:
             driven.append(self._tick(arms, eps[:, tick]))
             returns -= [self._miss_m(arm) for arm in arms]
             returns -= _ACTION_WEIGHT * np.square(driven[-1][2]).sum(axis=1)
-        conducts = np.moveaxis(np.stack(driven, axis=2), 1, 0)
-        return [
-            Conduct(*conduct, {"50-step return": float(total)})
-            for conduct, total in zip(conducts, returns, strict=True)
-        ]
+        return _conducts(driven, [{"50-step return": float(total)} for total in returns])
 
     def pictures(self, shot: Shot) -> Iterator[Frame]:
         """The shot seen from above, drawn by the software camera."""
@@ -164,6 +159,12 @@ class Reacher:
 
     def _miss_m(self, arm: mujoco.MjData) -> float:
         return float(np.linalg.norm(self._offset_m(arm)))
+
+
+def _conducts(driven: Sequence[tuple[Floats, Floats, Floats]], scores: Sequence[dict[str, float]]) -> list[Conduct]:
+    """From what `_tick` gave in each tick, and the scores of each arm."""
+    base, asked, sent = (np.stack(part, axis=1) for part in zip(*driven, strict=True))
+    return [Conduct(base[arm], asked[arm], sent[arm], own) for arm, own in enumerate(scores)]
 
 
 def _policy_noise(noise: Floats, seeds: Sequence[int]) -> Floats:
