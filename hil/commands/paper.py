@@ -81,8 +81,12 @@ def paper_world(world: str, options: WorldOptions, console: Console) -> None:
     with CellStore(options.cells) as store:
         rows, seconds = _measured(world, options, conditions_of(world, options.effort(world)), store, console)
     console.print(world_report.rich_table(world, rows))
+    summary = world_report.shortest_messages(rows)
+    print(summary)
     if options.out is not None:
-        _write_world(options.out, world, options.command(world), rows, seconds)
+        took = f"its cells took {seconds / 60:.0f} minutes of one core"
+        world_report.write_csv(options.out, rows, (options.command(world), took, summary, *REMARKS[world]))
+        print(f"wrote {options.out}")
 
 
 def paper_all(options: WorldOptions, console: Console) -> None:
@@ -130,12 +134,6 @@ def _measured(
     world: str, options: WorldOptions, conditions: Sequence[Condition], store: CellStore, console: Console
 ) -> tuple[list[Row], float]:
     return measure_world(world, options.effort(world), conditions, store, console, options.workers)
-
-
-def _write_world(path: Path, world: str, command: str, rows: Sequence[Row], seconds: float) -> None:
-    took = f"its cells took {seconds / 60:.0f} minutes of one core"
-    world_report.write_csv(path, rows, (command, took, *REMARKS[world]))
-    print(f"wrote {path}")
 
 
 def _check_simulators() -> None:

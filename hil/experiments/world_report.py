@@ -11,8 +11,8 @@ from hil.experiments.intervals import clopper_pearson
 from hil.experiments.paper_robomaster import Proportion
 from hil.experiments.world_points import PaperCell, headline_point
 from hil.experiments.world_reading import COHERENCY
-from hil.experiments.world_rollout import NO_MESSAGE
-from hil.experiments.world_tables import WRONG_KEY, Row
+from hil.experiments.world_rollout import NO_MESSAGE, SENT
+from hil.experiments.world_tables import WRONG_KEY, Row, shortest_ticks
 from mtm_onboard.protocol.atomicfile import replacing
 
 _COLUMNS = (
@@ -74,6 +74,17 @@ def rich_table(world: str, rows: Sequence[Row]) -> Table:
             *(values.get(detector, "") for detector in detectors), _differs(group),
         )  # fmt: skip
     return table
+
+
+def shortest_messages(rows: Sequence[Row]) -> str:
+    """One sentence: the shortest messages that each detector reads as well as the paper's reads the headline."""
+    headline = headline_point(rows[0].point.world)
+    detectors = list(dict.fromkeys(row.detector for row in rows if row.arm == SENT and row.point == headline))
+    parts = [f"{detector} {shortest_ticks(rows, detector) or 'none'}" for detector in detectors]
+    return (
+        f"shortest messages of {headline.arrangement}, M = {headline.alphabet_size}, read as well as coherency reads "
+        f"T = {headline.message_ticks}: T = {', '.join(parts)} (of those measured; Fisher's exact test at 5 %)"
+    )
 
 
 def _differs(group: Sequence[Row]) -> str:

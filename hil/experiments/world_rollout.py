@@ -5,12 +5,14 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from hil.experiments.cells import Scalar, Values
-from hil.experiments.world_points import Point, point_of
+from hil.experiments.world_genie import GENIE, Knowledge, genie_scores, learn, lessons
+from hil.experiments.world_points import Point, headline_point, point_of
 from hil.experiments.world_reading import Seen, pooled_scores, read_windows
 from hil.sensors.video import write_video
 from hil.worlds.noise import keyed_noise
@@ -31,6 +33,8 @@ SECONDS = "seconds"
 # Wrong keys that try each rollout.
 DECOYS = 5
 
+# Rollouts that teach the genie; their seeds count from 0, far from any that is reported.
+_LESSONS = {"discovery": 8, "lunar-lander": 6, "reacher": 6, "football": 12}
 _KEYS_STREAM, _GOALS_STREAM = 5, 6
 
 
@@ -64,31 +68,65 @@ def decode_batch(parameters: Values, seed: int) -> dict[str, Scalar]:
     where wrong keys were tried `wrong`, the symbols that those had right. `seconds` is the processor time it took.
     """
     started_s = time.process_time()
-    point, batch = point_of(parameters), int(parameters["batch"])
-    world = make_world(point.world)
-    seeds = range(seed, seed + batch)
-    goals = np.array([_goals(world, point, own) for own in seeds])
-    messages = [_messages(world, point, own, number) for own, number in zip(goals, seeds, strict=True)]
-    keys = [np.random.default_rng([_KEYS_STREAM, own]) for own in seeds]
+    point = point_of(parameters)
+    keys = [np.random.default_rng([_KEYS_STREAM, own]) for own in range(seed, seed + int(parameters["batch"]))]
     secrets = [[key.bytes(32) for _ in range(1 + int(parameters["decoys"]))] for key in keys]
-    shape = batch, point.goals, point.goal_ticks, len(world.axes)
-    noise: Floats = np.zeros(shape)
-    if parameters["arm"] == SENT:
-        codebooks = [Codebook(secret, point.scheme) for secret, *_ in secrets]
-        sent = [keyed_noise(book, own, world.axes) for book, own in zip(codebooks, messages, strict=True)]
-        noise = np.stack(sent).reshape(shape)
+    recorded = record(
+        point, [first for first, *_ in secrets], seed, keyed=parameters["arm"] == SENT,
+        renderer=str(parameters["renderer"]), frames=str(parameters["frames"]),
+    )  # fmt: skip
     arrangements = [point.arrangement, *(part for part in str(parameters["parts"]).split("+") if part)]
     results: dict[str, list[float]] = {}
-    for rollout, symbols, own in zip(world.run(goals, noise, seeds), messages, secrets, strict=True):
-        seen = watch(world, rollout, point.scheme, str(parameters["renderer"]), str(parameters["frames"]))
+    for (seen, symbols), own in zip(recorded, secrets, strict=True):
         for detector in str(parameters["detectors"]).split("+"):
-            for arrangement in arrangements:
+            for arrangement in arrangements if detector != GENIE else arrangements[:1]:
                 part = point.of_arrangement(arrangement)
                 looked_at = seen if part == point else _narrowed(seen, part.scheme)
                 for name, value in _decoded(part, own, looked_at, symbols, detector):
                     results.setdefault(f"{detector} {arrangement} {name}", []).append(value)
     lists = {name: json.dumps(values) for name, values in results.items()}
     return {**lists, SECONDS: time.process_time() - started_s}
+
+
+def record(
+    point: Point,
+    secrets: Sequence[bytes],
+    seed: int,
+    *,
+    keyed: bool = True,
+    renderer: str = SOFTWARE,
+    frames: str = MEMORY,
+) -> Iterator[tuple[list[Seen], list[tuple[int, ...]]]]:
+    """Run and film one rollout for each secret, of `seed` and those after it, sending nothing unless `keyed`.
+
+    Yields what was seen, and each message's symbols.
+    """
+    world = make_world(point.world)
+    seeds = range(seed, seed + len(secrets))
+    goals = np.array([_goals(world, point, own) for own in seeds])
+    messages = [_messages(world, point, own, number) for own, number in zip(goals, seeds, strict=True)]
+    shape = len(secrets), point.goals, point.goal_ticks, len(world.axes)
+    noise: Floats = np.zeros(shape)
+    if keyed:
+        codebooks = [Codebook(secret, point.scheme) for secret in secrets]
+        sent = [keyed_noise(book, own, world.axes) for book, own in zip(codebooks, messages, strict=True)]
+        noise = np.stack(sent).reshape(shape)
+    for rollout, own in zip(world.run(goals, noise, seeds), messages, strict=True):
+        yield watch(world, rollout, point.scheme, renderer, frames), own
+
+
+@cache
+def _knowledge(world: str) -> Knowledge:
+    """What the genie knows of a world, from rollouts of the headline point that nothing is measured on."""
+    point = headline_point(world)
+    secrets = [np.random.default_rng([_KEYS_STREAM, own]).bytes(32) for own in range(_LESSONS[world])]
+    examples = [
+        example
+        for (seen, symbols), secret in zip(record(point, secrets, 0), secrets, strict=True)
+        for channel in lessons(Codebook(secret, point.scheme), seen, symbols)
+        for example in channel
+    ]
+    return learn(examples)
 
 
 def watch(world: World, rollout: Rollout, scheme: Scheme, renderer: str = SOFTWARE, frames: str = MEMORY) -> list[Seen]:
@@ -141,7 +179,10 @@ def _decoded(
 ) -> Iterator[tuple[str, float]]:
     """Names and values of one rollout's results under one detector; the first of the secrets is the right one."""
     truth = np.concatenate([np.asarray(symbols) for symbols in sent])
-    scores, *others = [_message_scores(Codebook(secret, point.scheme), point, seen, detector) for secret in secrets]
+    if detector == GENIE:
+        scores, others = _genie_scores(Codebook(secrets[0], point.scheme), point, seen, sent), []
+    else:
+        scores, *others = [_message_scores(Codebook(secret, point.scheme), point, seen, detector) for secret in secrets]
     right = np.argmax(scores, axis=1) == truth
     best = np.sort(scores, axis=1)
     yield "goals", float(right.reshape(-1, point.goal_symbols).all(axis=1).sum())
@@ -149,6 +190,13 @@ def _decoded(
     yield "margin", float(np.mean(best[:, -1] - best[:, -2]))
     if others:
         yield "wrong", float(sum((np.argmax(other, axis=1) == truth).sum() for other in others))
+
+
+def _genie_scores(codebook: Codebook, point: Point, seen: Sequence[Seen], sent: Sequence[Sequence[int]]) -> Floats:
+    """Log-likelihoods (symbols, M) of a single or "same" arrangement, all channels together."""
+    knowledge = _knowledge(point.world)
+    channels = zip(codebook.scheme.channels, lessons(codebook, seen, sent), strict=True)
+    return pooled_scores([genie_scores(knowledge, codebook, own, seen, channel) for channel, own in channels], GENIE)
 
 
 def _message_scores(codebook: Codebook, point: Point, seen: Sequence[Seen], detector: str) -> Floats:

@@ -2,13 +2,16 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
 from rich.console import Console
+from scipy.stats import fisher_exact
 
 from hil.experiments.cells import Cell, CellStore, Values
 from hil.experiments.paper_robomaster import Proportion
 from hil.experiments.sweep import run_sweep
+from hil.experiments.world_genie import GENIE
 from hil.experiments.world_points import HEADLINES, PaperCell, Point, headline_point, paper_cells
 from hil.experiments.world_reading import COHERENCY, MATCHED
 from hil.experiments.world_rollout import (
@@ -24,6 +27,7 @@ from hil.experiments.world_rollout import (
 )
 
 DETECTORS = (COHERENCY, MATCHED)
+_SIGNIFICANT = 0.05
 WRONG_KEY = "wrong key"
 THROUGH_A_FILE = "from a file"
 # Rollouts that one process takes at once: enough for a simulator that steps them together, few enough to be stopped.
@@ -48,10 +52,11 @@ class Effort:
 
 @dataclass(frozen=True)
 class Condition:
-    """What is recorded: a point, how many rollouts, and what is special about them."""
+    """What is recorded: a point, how many rollouts, who reads them, and what is special about them."""
 
     point: Point
     rollouts: int
+    detectors: tuple[str, ...] = DETECTORS
     arm: str = SENT
     decoys: int = 0
     frames: str = MEMORY
@@ -85,7 +90,14 @@ def conditions_of(world: str, effort: Effort) -> list[Condition]:
         points, shorter = [headline_point(world, shortest)], []
     rollouts = dict.fromkeys(points, effort.other_rollouts)
     rollouts |= dict.fromkeys([*shorter, headline], effort.headline_rollouts)
-    found = [Condition(point, count, decoys=DECOYS if point == headline else 0) for point, count in rollouts.items()]
+    compared = {*shorter, headline}
+    found = [
+        Condition(
+            point, count, (*DETECTORS, GENIE) if point in compared else DETECTORS,
+            decoys=DECOYS if point == headline else 0,
+        )
+        for point, count in rollouts.items()
+    ]  # fmt: skip
     found.append(Condition(headline, effort.headline_rollouts, arm=NO_MESSAGE))
     found.append(Condition(headline, min(_BATCH[world], effort.headline_rollouts), frames=FILE))
     return found
@@ -114,6 +126,31 @@ def measure(
     return rows, sum(float(result[SECONDS]) for result in results)
 
 
+def shortest_ticks(rows: Sequence[Row], detector: str) -> int | None:
+    """The shortest message of the headline's scheme that a detector reads as well as the paper's reads the headline.
+
+    As well: not significantly fewer right (Fisher's exact test at 5 %), at this length and at all longer ones.
+    """
+    headline = headline_point(rows[0].point.world)
+    sent = {
+        (row.point.message_ticks, row.detector): row.goals
+        for row in rows
+        if row.arm == SENT and row.goals is not None
+        and row.point == replace(headline, message_ticks=row.point.message_ticks)
+    }  # fmt: skip
+    asked = sent[headline.message_ticks, COHERENCY]
+    shortest = None
+    for ticks in sorted((ticks for ticks, name in sent if name == detector), reverse=True):
+        if ticks > headline.message_ticks:
+            continue
+        own = sent[ticks, detector]
+        table = [[own.successes, own.trials - own.successes], [asked.successes, asked.trials - asked.successes]]
+        if fisher_exact(np.array(table), alternative="less").pvalue < _SIGNIFICANT:
+            break
+        shortest = ticks
+    return shortest
+
+
 def _cells(world: str, condition: Condition, effort: Effort) -> list[Cell]:
     size = _BATCH[world]
     parts = _PARTS.get(world, ()) if condition.point.arrangement == "same" else ()
@@ -121,7 +158,7 @@ def _cells(world: str, condition: Condition, effort: Effort) -> list[Cell]:
         Cell(
             "worlds",
             rollout_parameters(
-                condition.point, min(size, condition.rollouts - first), DETECTORS, arm=condition.arm,
+                condition.point, min(size, condition.rollouts - first), condition.detectors, arm=condition.arm,
                 decoys=condition.decoys, parts=parts, renderer=effort.renderer, frames=condition.frames,
             ),
             effort.first_seed + first,
@@ -153,7 +190,7 @@ def _rows(world: str, condition: Condition, results: dict[str, list[float]]) -> 
         goals = Proportion(int(sum(own["goals"])), trials)
         reported = paper.get(point) if arm == SENT else None
         yield Row(arm, point, detector, condition.rollouts, goals, symbols, margin, reported)
-        if condition.decoys:
+        if condition.decoys and detector != GENIE:
             wrong = int(sum(results[f"{detector} {arrangement} wrong"]))
             tried = Proportion(wrong, symbols.trials * condition.decoys)
             yield Row(WRONG_KEY, point, detector, condition.rollouts, None, tried)

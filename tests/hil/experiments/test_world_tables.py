@@ -7,7 +7,7 @@ from hil.experiments.paper_robomaster import Proportion
 from hil.experiments.world_points import headline_point, paper_cells
 from hil.experiments.world_report import against_the_paper
 from hil.experiments.world_rollout import NO_MESSAGE
-from hil.experiments.world_tables import Effort, Row, conditions_of
+from hil.experiments.world_tables import Effort, Row, conditions_of, shortest_ticks
 
 
 def table_of(path):
@@ -82,3 +82,25 @@ def test_a_cell_is_held_against_the_paper_s_by_their_intervals(right, verdict):
     cell = next(cell for cell in paper_cells("discovery") if cell.percent == 79.0)
     goals = Proportion(right, 400)
     assert against_the_paper(Row("message", cell.point, "coherency", 50, goals, goals, 0.1, cell)) == verdict
+
+
+def row_of(ticks, detector, right):
+    goals = Proportion(right, 400)
+    return Row("message", headline_point("reacher", ticks), detector, 50, goals, goals, 0.1)
+
+
+def test_the_shortest_message_is_the_last_of_those_read_as_well():
+    rows = [row_of(240, "coherency", 399), row_of(60, "coherency", 120)]
+    rows += [row_of(ticks, "matched", right) for ticks, right in ((240, 400), (96, 398), (60, 396), (40, 270))]
+    assert shortest_ticks(rows, "matched") == 60
+    assert shortest_ticks(rows, "coherency") == 240
+
+
+def test_a_longer_message_read_badly_ends_the_search():
+    rows = [row_of(240, "coherency", 399)]
+    rows += [row_of(ticks, "matched", right) for ticks, right in ((240, 400), (96, 300), (60, 400))]
+    assert shortest_ticks(rows, "matched") == 240
+
+
+def test_a_detector_that_never_reads_as_well_has_no_shortest_message():
+    assert shortest_ticks([row_of(240, "coherency", 399), row_of(240, "matched", 300)], "matched") is None
