@@ -19,6 +19,11 @@ app = typer.Typer(
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
 )  # fmt: skip
 
+_TRACKER_HELP = (
+    "How to find robots in a video: aruco, colour:NAME,..., brightness:X0,Y0,X1,Y1, arms:INNER,OUTER, football or "
+    "flow:X0,Y0,X1,Y1 (pixels from the upper left corner)."
+)
+
 
 class StrategyName(StrEnum):
     """How channels are used; repeated from the planner so that --help need not load it."""
@@ -54,9 +59,7 @@ def decode(
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
-    tracker: Annotated[
-        str, typer.Option(metavar="NAME", help="How to find robots in a video: aruco, colour:NAME,..., brightness.")
-    ] = "aruco",
+    tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
@@ -111,9 +114,7 @@ def learn_profile(
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
-    tracker: Annotated[
-        str, typer.Option(metavar="NAME", help="How to find robots in a video: aruco, colour:NAME,..., brightness.")
-    ] = "aruco",
+    tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,

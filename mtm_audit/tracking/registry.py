@@ -16,6 +16,7 @@ TRACKERS = ", ".join(
         "brightness[:<x0>,<y0>,<x1>,<y1>[,<threshold>]]",
         "arms[:<inner colour>,<outer colour>]",
         "football[:<colour>,...]",
+        "flow:<x0>,<y0>,<x1>,<y1>",
     ]
 )
 
@@ -54,4 +55,8 @@ def tracker(name: str) -> Tracker:
         from mtm_audit.tracking.football import parse_football
 
         return parse_football(choice)
+    if kind == "flow":
+        from mtm_audit.tracking.flow import parse_flow
+
+        return parse_flow(choice)
     raise MtmError(f"there is no tracker {name!r}; choose one of: {TRACKERS}")
