@@ -46,7 +46,7 @@ LANDING_LEAN_PER_M, LANDING_LEAN_PER_MPS = 0.05, 0.15
 SINK_PER_S, SINK_MPS = 0.6, (0.5, 4.0)
 
 _STREAM = 23
-_FADING_PER_PICTURE = 0.15
+FADING_PER_PICTURE = 0.15
 
 
 class LunarLander:
@@ -188,7 +188,7 @@ def _environment_seed(parts: Sequence[int]) -> int:
 def _state(environment: lunar_lander.LunarLander) -> Floats:
     """One row of states; the flames fade by a picture, which Gymnasium does as it draws them."""
     for particle in environment.particles:
-        particle.ttl -= _FADING_PER_PICTURE
+        particle.ttl -= FADING_PER_PICTURE
     environment._clean_particles(False)  # type: ignore[no-untyped-call]
     terrain = [polygon[0][1] for polygon in environment.sky_polys] + [environment.sky_polys[-1][1][1]]
     bodies = [(*body.position, body.angle) for body in environment.drawlist]

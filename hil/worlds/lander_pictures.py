@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.envs.box2d import lunar_lander
 from numpy.typing import NDArray
 
-from hil.worlds.lander import BODIES, TERRAIN_POINTS
+from hil.worlds.lander import BODIES, FADING_PER_PICTURE, TERRAIN_POINTS
 from hil.worlds.world import Shot
 from mtm_audit.recordings.frames import Frame, Image
 from mtm_audit.tracks import Floats
@@ -80,7 +80,7 @@ def _pose(environment: lunar_lander.LunarLander, state: Floats) -> None:
         body.position, body.angle = (x_m, y_m), angle_rad
     environment._clean_particles(True)  # type: ignore[no-untyped-call]
     for x_m, y_m, life in flames.tolist():
-        environment._create_particle(1.0, x_m, y_m, life + 0.15)  # type: ignore[no-untyped-call]
+        environment._create_particle(1.0, x_m, y_m, life + FADING_PER_PICTURE)  # type: ignore[no-untyped-call]
 
 
 def _parts(state: Floats) -> tuple[Floats, Floats]:
