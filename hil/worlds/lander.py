@@ -31,10 +31,10 @@ BODIES = 3
 # A particle lives for at most seven pictures, and two are born in a tick.
 MOST_PARTICLES = 16
 
-# The paper does not give its controller's gains, and accuracy hangs on them. These were chosen, on seeds below 10,000, so
-# that accuracies come near the paper's at M = 8 with T = 192 and 288; at T = 96 they still lie well above the paper's. A
+# The paper does not give its controller's gains, and accuracy hangs on them. These were chosen, on seeds below 10,000,
+# so that accuracies come near the paper's at M = 8 with T = 192 and 288; at T = 96 they lie well above the paper's. A
 # lightly damped turn lets the side engine's noise across its dead zone of a half; a stiff lift, which runs the main
-# engine against its limits in a third of all ticks, fights the noise as the paper's loop does.
+# engine's command into its limits in a third of all ticks, fights the noise as the paper's loop does.
 LEAN_PER_M, LEAN_PER_MPS, MOST_LEAN_RAD = 0.03, 0.1, 0.3
 TURN_PER_RAD, TURN_PER_RADPS = 10.0, 1.0
 LIFT_PER_M, LIFT_PER_MPS = 10.0, 6.0
