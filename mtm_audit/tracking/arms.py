@@ -7,9 +7,9 @@ import numpy as np
 
 from mtm_audit.recordings.frames import Frame
 from mtm_audit.tracking.armpose import Stations, joint_angles
-from mtm_audit.tracking.cover import Cover, cover_of, split_colours
+from mtm_audit.tracking.cover import cover_of, split_colours
 from mtm_audit.tracking.gather import Progress, steady
-from mtm_audit.tracking.links import STATIONS, Box, Link, bounds, see_link
+from mtm_audit.tracking.links import STATIONS, Box, Link, see_link, widened
 from mtm_audit.tracks import Floats, Track
 from mtm_onboard.protocol.errors import MtmError
 
@@ -66,15 +66,16 @@ class ArmTracker:
         height_px = 0
         seen: tuple[list[Link | None], list[Link | None]] = ([], [])
         steps_px: list[float | None] = [None, None]
-        window: Box | None = None
+        windows: list[Box | None] = [None, None]
         for frame in steady(frames, progress):
             times_s.append(frame.time_s)
             height_px = frame.size[1]
-            links = _see(frame, self._covers, window, steps_px)
-            boxes = [link.box for link in links if link is not None]
-            window = bounds(boxes, MARGIN_PX, frame.size) if len(boxes) == len(links) else None
-            for history, link in zip(seen, links, strict=True):
-                history.append(link)
+            for number, cover in enumerate(self._covers):
+                window = windows[number] or (0, 0, *frame.size)
+                found = see_link(frame.image, cover, window, steps_px[number])
+                link, steps_px[number] = found or (None, steps_px[number])
+                windows[number] = None if link is None else widened(link.box, MARGIN_PX, frame.size)
+                seen[number].append(link)
         for name, place, history in zip(self._names, ("inner", "outer"), seen, strict=True):
             if not any(history):
                 raise MtmError(
@@ -91,18 +92,6 @@ class ArmTracker:
                 "links in view"
             )
         return [Track(TRACK_NAME, np.array(times_s), angles, valid, axes=("inner", "outer"), unit="rad")]
-
-
-def _see(
-    frame: Frame, covers: tuple[Cover, ...], window: Box | None, steps_px: list[float | None]
-) -> list[Link | None]:
-    """Each link inside the window, or anywhere when there is none; the first sight of one settles its `steps_px`."""
-    links: list[Link | None] = []
-    for number, cover in enumerate(covers):
-        found = see_link(frame.image, cover, window or (0, 0, *frame.size), steps_px[number])
-        links.append(None if found is None else found[0])
-        steps_px[number] = steps_px[number] if found is None else found[1]
-    return links
 
 
 def _stations(links: list[Link | None], height_px: int) -> Stations:

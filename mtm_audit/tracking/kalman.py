@@ -6,7 +6,7 @@ import numpy as np
 from filterpy.common import Q_discrete_white_noise
 from filterpy.kalman import KalmanFilter
 
-from mtm_audit.tracks import Track
+from mtm_audit.tracks import Floats, Track
 
 
 def kalman_smoothed(track: Track, process_noise: float = 6.0, measurement_noise: float = 0.8) -> Track:
@@ -28,10 +28,15 @@ def kalman_smoothed(track: Track, process_noise: float = 6.0, measurement_noise:
     kalman.H = np.kron(np.eye(axes), [[1.0, 0.0]])
     kalman.R = measurement_noise**2 * np.eye(axes)
     positions = np.full_like(track.positions, np.nan)
-    for row, step in zip(seen, steps, strict=True):
+    models: dict[float, tuple[Floats, Floats]] = {}
+    for row, step in zip(seen, np.round(steps, 6), strict=True):
         if step > 0:
-            noise = np.kron(np.eye(axes), Q_discrete_white_noise(2, dt=step, var=process_noise**2))
-            kalman.predict(F=np.kron(np.eye(axes), [[1.0, step], [0.0, 1.0]]), Q=noise)
+            # Most steps are of one length, and building the matrices costs more than using them.
+            if step not in models:
+                noise = np.kron(np.eye(axes), Q_discrete_white_noise(2, dt=step, var=process_noise**2))
+                models[step] = np.kron(np.eye(axes), [[1.0, step], [0.0, 1.0]]), noise
+            transition, noise = models[step]
+            kalman.predict(F=transition, Q=noise)
             kalman.update(track.positions[row])
         positions[row] = (kalman.H @ kalman.x)[:, 0]
     return replace(track, positions=positions)

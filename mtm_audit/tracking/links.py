@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from mtm_audit.recordings.frames import Image
 from mtm_audit.tracking.cover import COVERED, Cover
@@ -83,9 +82,12 @@ def _slices(points: Floats, weights: Floats, step_px: float | None) -> tuple[Flo
     return stations, sums[:, 0] / step_px, step_px
 
 
-def bounds(boxes: list[Box], margin_px: int, size: tuple[int, int]) -> Box:
-    """The rectangle around boxes, that much wider on every side as the picture allows."""
-    edges: NDArray[np.int64] = np.array(boxes)
-    left, upper = np.maximum(edges[:, :2].min(axis=0) - margin_px, 0)
-    right, lower = np.minimum(edges[:, 2:].max(axis=0) + margin_px, size)
-    return int(left), int(upper), int(right), int(lower)
+def widened(box: Box, margin_px: int, size: tuple[int, int]) -> Box:
+    """The box, that much wider on every side as a picture of that size allows."""
+    left, upper, right, lower = box
+    return (
+        max(left - margin_px, 0),
+        max(upper - margin_px, 0),
+        min(right + margin_px, size[0]),
+        min(lower + margin_px, size[1]),
+    )
