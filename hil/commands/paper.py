@@ -9,7 +9,6 @@ from rich.console import Console
 from hil.experiments import world_conduct, world_report
 from hil.experiments.cells import CellStore
 from hil.experiments.paper_robomaster import measure, rich_table, write_csv
-from hil.experiments.world_remarks import REMARKS
 from hil.experiments.world_rollout import NATIVE, SOFTWARE
 from hil.experiments.world_tables import Condition, Effort, Row, conditions_of, null_conditions_of
 from hil.experiments.world_tables import measure as measure_world
@@ -85,7 +84,7 @@ def paper_world(world: str, options: WorldOptions, console: Console) -> None:
     print(summary)
     if options.out is not None:
         took = f"its cells took {seconds / 60:.0f} minutes of one core"
-        world_report.write_csv(options.out, rows, (options.command(world), took, summary, *REMARKS[world]))
+        world_report.write_csv(options.out, rows, (options.command(world), took, summary, *world_report.remarks(world)))
         print(f"wrote {options.out}")
 
 

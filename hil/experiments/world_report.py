@@ -2,6 +2,7 @@
 
 import csv
 import math
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,6 +22,7 @@ _COLUMNS = (
     "symbol_percent", "symbol_percent_low", "symbol_percent_high", "margin", "paper_message_percent",
     "paper_standard_error", "paper_margin", "against_the_paper",
 )  # fmt: skip
+_REMARKS = Path(__file__).with_name("world_remarks.toml")
 # The paper's table "Null conditions": percent of symbols right with wrong keys, and without a message.
 _PAPER_NULL = {
     "discovery": {WRONG_KEY: 12.10, NO_MESSAGE: 11.75},
@@ -74,6 +76,13 @@ def rich_table(world: str, rows: Sequence[Row]) -> Table:
             *(values.get(detector, "") for detector in detectors), _differs(group),
         )  # fmt: skip
     return table
+
+
+def remarks(world: str) -> list[str]:
+    """Why cells of the world differ from the paper's, a line each."""
+    with _REMARKS.open("rb") as file:
+        found: list[str] = tomllib.load(file)[world]
+    return found
 
 
 def shortest_messages(rows: Sequence[Row]) -> str:
