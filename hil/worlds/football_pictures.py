@@ -14,7 +14,7 @@ import numpy as np
 
 from hil.worlds.vmas_pictures import native_image, scale_px, to_pixels
 from mtm_audit.recordings.frames import Image
-from mtm_audit.tracks import Floats
+from mtm_audit.tracks import Bools, Floats
 
 if TYPE_CHECKING:
     from vmas.simulator.environment import Environment
@@ -109,12 +109,12 @@ def _put_number(image: Image, number: int, centre_px: Floats) -> None:
 
 
 @cache
-def _number(number: int) -> Image:
+def _number(number: int) -> Bools:
     """Where the number of an agent, counted from 1, is black."""
     width, height = _NUMBER_PX
     stencil = np.zeros((height, width), dtype=np.uint8)
     cv2.putText(stencil, str(number + 1), (1, height - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.65, 255, 1, cv2.LINE_8)
-    return stencil > 0
+    return np.asarray(stencil > 0)
 
 
 def _box(

@@ -1,7 +1,9 @@
 """A team of three that plays football by rules, and the 64 strategies that it plays by.
 
 Two go for the ball and push it side by side, since one alone does not get it past an opponent as strong as itself; the
-third keeps a formation. Every agent follows a wanted velocity under a controller of position and velocity (PD).
+third keeps a formation. Every agent follows a wanted velocity under a controller of position and velocity (PD). The
+paper does not say by what rules its team plays; against VMAS's opponents at full strength this one holds its own half
+of the time and seldom scores within 50 s.
 """
 
 from dataclasses import dataclass
@@ -106,7 +108,7 @@ class Team:
         mate_xy_m = sight.own_xy_m[self._games, np.argmax(sight.own_xy_m[..., 0], axis=1)]
         passing = np.mod(self._time_s, chosen.passes_every_s) > chosen.passes_every_s - _PASS_S
         passing &= mate_xy_m[:, 0] > sight.ball_xy_m[:, 0] + _PASS_AHEAD_M
-        return np.where(passing[:, None], mate_xy_m, goal_xy_m)
+        return np.asarray(np.where(passing[:, None], mate_xy_m, goal_xy_m))
 
     def _roles(self, own_xy_m: Floats, behind_xy_m: Floats) -> Integers:
         """Numbers (3, n) of the nearest to the point behind the ball, of the second, and of who stands back."""

@@ -15,7 +15,7 @@ pytest.importorskip("vmas")
 
 TICKS = 20
 SEEDS = (3, 4, 5)
-# A metre in pixels, the ball on the centre spot of a picture.
+# A metre in pixels.
 SCALE_PX = 800 / 2.88
 
 
@@ -82,17 +82,18 @@ def test_nobody_leaves_the_pitch_or_is_faster_than_the_simulator_allows():
 
 
 def test_after_a_goal_play_goes_on_from_a_kick_off(monkeypatch):
+    kick_off = football._environment
+
     def just_before_a_goal(count, seed):
-        env = football._environment_of_the_scenario(count, seed)
+        env = kick_off(count, seed)
         env.scenario.ball.set_pos(torch.tensor([1.49, 0.0]), batch_index=1)
         env.scenario.ball.set_vel(torch.tensor([0.3, 0.0]), batch_index=1)
         return env
 
-    monkeypatch.setattr(football, "_environment_of_the_scenario", football._environment, raising=False)
     monkeypatch.setattr(football, "_environment", just_before_a_goal)
-    conducts = [rollout.conduct for rollout in Football().run(np.zeros((3, 1), dtype=int), noise(0.0), SEEDS)]
-    assert [conduct.scores[SCORED] for conduct in conducts] == [0.0, 1.0, 0.0]
-    states = Football().run(np.zeros((3, 1), dtype=int), noise(0.0), SEEDS)[1].shots[0].states
+    rollouts = Football().run(np.zeros((3, 1), dtype=int), noise(0.0), SEEDS)
+    assert [rollout.conduct.scores[SCORED] for rollout in rollouts] == [0.0, 1.0, 0.0]
+    states = rollouts[1].shots[0].states
     (jump,) = np.flatnonzero(np.linalg.norm(np.diff(states[:, 12:], axis=0), axis=1) > 0.5)
     after = states[jump + 1].reshape(7, 2)
     assert jump < TICKS - 1
