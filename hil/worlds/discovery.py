@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.worlds.discovery_pictures import PICTURE_PX, draw, draw_natively
-from hil.worlds.discovery_tracking import AgentTracker
+from hil.worlds.discovery_pictures import AGENT_COLOUR, PICTURE_PX, draw, draw_natively
 from hil.worlds.world import Conduct, Integers, Rollout, Shot
 from mtm_audit.recordings.frames import Frame
 from mtm_audit.tracking.registry import Tracker
@@ -92,8 +91,10 @@ class Discovery:
             yield Frame(float(time_s), image)
 
     def tracker(self) -> Tracker:
-        """The centroid of the agent's colour."""
-        return AgentTracker()
+        """The centroid of the agent's colour, which the rays of its lidar cut into sectors."""
+        from mtm_audit.tracking.centroid import CentroidTracker
+
+        return CentroidTracker(AGENT_COLOUR, name="agent")
 
 
 def _check(goals: Integers, noise: Floats, seeds: Sequence[int], choices: int) -> None:

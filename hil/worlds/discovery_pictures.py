@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from vmas.simulator.environment import Environment
 
 PICTURE_PX = (704, 704)
+AGENT_COLOUR = "#4040bf"  # its hue, whatever shines through
 
 _ZOOM = 1.0
 _SCALE_PX = scale_px(PICTURE_PX, _ZOOM)

@@ -110,10 +110,14 @@ class Reacher:
         return rendered_pictures(self._model, shot)
 
     def tracker(self) -> Tracker:
-        """The segmentation of both links by hue: one track of their joint angles."""
+        """The segmentation of both links by hue: one track of their directions.
+
+        The paper's angular velocity of the outer arm, r x v / |r|^2 with v relative to the elbow, is that of the link
+        in the picture, which the inner joint turns as well: that is how the arms interfere in its tables.
+        """
         from mtm_audit.tracking.arms import ArmTracker
 
-        return ArmTracker()
+        return ArmTracker(relative=False)
 
     def _posed_arm(self, seed: int) -> mujoco.MjData:
         draw = np.random.default_rng([seed, _START])

@@ -38,7 +38,8 @@ class ArmTracker:
 
     `inner` and `outer` are colours as `colour:` takes them; `base_px` is the column and row of the point about which
     the inner link turns, found from its turning when None. The paper smooths the links' middles with its Kalman
-    filter; `smooth` False leaves that out.
+    filter; `smooth` False leaves that out. The outer link's direction is counted from the inner one, as its joint
+    turns it, or like the inner one's when `relative` is False.
     """
 
     pixels: Literal["gray", "bgr"] = "bgr"
@@ -50,17 +51,19 @@ class ArmTracker:
         base_px: tuple[float, float] | None = None,
         *,
         smooth: bool = True,
+        relative: bool = True,
     ) -> None:
         self._names = (inner, outer)
         self._covers = (cover_of(inner), cover_of(outer))
-        self._base_px, self._smooth = base_px, smooth
+        self._base_px, self._smooth, self._relative = base_px, smooth, relative
 
     def track(self, frames: Iterable[Frame], progress: Progress | None = None) -> list[Track]:
         """Track in `frames` of blue, green and red: one track, `arm`, axes `inner` and `outer` in radians.
 
         `inner` is the direction of the inner link from the base on, counter-clockwise from the picture's right;
-        `outer` that of the outer link from the inner one on; both run on beyond a turn. A frame in which too little
-        of a link shows is not valid. Raises MtmError when no frame shows the arm or the picture changes its size.
+        `outer` that of the outer link from the inner one on (see `relative`); both run on beyond a turn. A frame in
+        which too little of a link shows is not valid. Raises MtmError when no frame shows the arm or the picture
+        changes its size.
         """
         times_s: list[float] = []
         height_px = 0
@@ -85,6 +88,8 @@ class ArmTracker:
         inner, outer = (_stations(history, height_px) for history in seen)
         base = None if self._base_px is None else np.array([self._base_px[0], height_px - 1 - self._base_px[1]])
         angles = joint_angles(np.array(times_s), inner, outer, base, smooth=self._smooth)
+        if not self._relative:
+            angles = np.cumsum(angles, axis=1)
         valid = np.asarray(np.isfinite(angles[:, 0]))
         if not valid.any():
             raise MtmError(

@@ -13,6 +13,7 @@ TRACKERS = ", ".join(
         "aruco",
         "aruco:mirrored",
         "colour:<name, #rrggbb or hsv(H-H,S-S,V-V)>[,<another>...]",
+        "centroid:<colour>[,<reach>]",
         "brightness[:<x0>,<y0>,<x1>,<y1>[,<threshold>]]",
         "arms[:<inner colour>,<outer colour>]",
         "football[:<colour>,...]",
@@ -43,6 +44,10 @@ def tracker(name: str) -> Tracker:
         from mtm_audit.tracking.cover import split_colours
 
         return ColourTracker(split_colours(choice))
+    if kind == "centroid" and choice:
+        from mtm_audit.tracking.centroid import parse_centroid
+
+        return parse_centroid(choice)
     if kind == "brightness":
         from mtm_audit.tracking.brightness import parse_brightness
 

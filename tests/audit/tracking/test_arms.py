@@ -55,6 +55,11 @@ def test_joint_angles_are_tracked_to_a_few_milliradians(smooth):
     assert np.all(rms_mrad(track) < [3.0, 6.0])
 
 
+def test_the_outer_link_s_own_direction_is_the_sum_of_both_angles():
+    (track,) = ArmTracker(relative=False).track(arm())
+    assert np.all(rms_mrad(track, np.cumsum(OPEN, axis=1)) < [3.0, 6.0])
+
+
 def test_angles_run_on_beyond_a_turn():
     angles = np.stack([6 * TIMES_S, 0.8 * np.sin(5 * TIMES_S)], axis=1)
     (track,) = tracker("arms").track(arm(angles))

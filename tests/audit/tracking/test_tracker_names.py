@@ -17,8 +17,8 @@ TICKS, SYMBOL = 300, 2
 SCHEME = Scheme("test", 50.0, (0.5, 5.0), 4, TICKS, (Channel("inner", "arm", ("inner",), 1, 1.0),))
 KEY = key_of(SCHEME)
 TRACKERS = (
-    "aruco", "colour:red", "colour:hsv(0-10,80-255,60-255)", "brightness:8,8,120,88", "arms", "arms:red,blue",
-    "football", "football:red,blue", "flow:20,20,60,60",
+    "aruco", "colour:red", "colour:hsv(0-10,80-255,60-255)", "brightness:8,8,120,88", "centroid:red", "arms",
+    "arms:red,blue", "football", "football:red,blue", "flow:20,20,60,60",
 )  # fmt: skip
 
 
