@@ -1,8 +1,9 @@
 """A team of three that plays football by rules, and the 64 strategies that it plays by.
 
-All three go for the ball, since one alone does not get it past an opponent as strong as itself: two push it side by
-side, the third follows in its place of the formation. Every agent follows a wanted velocity under a controller of
-position and velocity (PD). The paper does not say by what rules its team plays.
+Two go for the ball and push it side by side, since one alone does not get it past an opponent as strong as itself; the
+third keeps a formation. Every agent follows a wanted velocity under a controller of position and velocity (PD). The
+paper does not say by what rules its team plays, nor how strong its opponents were. Against VMAS's at full strength this
+team seldom scores within 50 s, while the paper's always did.
 """
 
 from dataclasses import dataclass
@@ -16,8 +17,8 @@ from mtm_audit.tracks import Floats
 TEMPOS_MPS = (0.12, 0.13, 0.14, 0.15)
 # On which side of the pitch (1: left, seen from its own goal) it goes around the ball and aims into the goal.
 BIASES = (-1.0, 1.0)
-# Where the third drives: so far behind the ball, and to the favoured side of it.
-FORMATIONS_M = ((0.04, 0.0), (0.04, 0.05), (0.1, 0.0), (0.0, 0.075))
+# Where the third stands: ahead of the ball, and to the favoured side of it.
+FORMATIONS_M = ((-0.5, 0.1), (-0.15, 0.4), (0.35, 0.3), (-0.12, 0.0))
 PASSES_EVERY_S = (15.0, 5.0)
 STRATEGIES = len(TEMPOS_MPS) * len(BIASES) * len(FORMATIONS_M) * len(PASSES_EVERY_S)
 
@@ -26,18 +27,20 @@ _TICK_S = 0.1
 _PASS_S = 1.5
 _PASS_AHEAD_M = 0.1
 _AIM_ASIDE_M = 0.06
+# How far agents can go, a radius from the lines.
+_PITCH_M = np.array([1.45, 0.70])
 # Distance of an agent's centre from the ball's when they touch.
 _CONTACT_M = 0.045
 # Each of the two on the ball keeps so far to its side of the ball's middle.
 _ASIDE_M = 0.026
 _LEAD_S = 0.3
-# Who came last so far goes on doing so unless nearer to the ball than another by this much.
+# Who stood back so far goes on doing so unless nearer to the ball than another by this much.
 _NEARER_M = 0.06
 # Action per error of velocity, and per velocity to hold it against the drag.
 _GAIN_S_PER_M = 12.0
 _HOLD_S_PER_M = 5.0
-# Velocity per error of position: to a point beside the ball, and sideways while pushing.
-_TO_BALL_1_PER_S, _SIDEWAYS_1_PER_S = 3.0, 2.5
+# Velocity per error of position: to a place, to a point beside the ball, and sideways while pushing.
+_TO_PLACE_1_PER_S, _TO_BALL_1_PER_S, _SIDEWAYS_1_PER_S = 1.5, 3.0, 2.5
 
 
 @dataclass(frozen=True)
@@ -74,11 +77,11 @@ class Sight:
 
 
 class Team:
-    """The rules, for n games at once; it remembers the time and who came last."""
+    """The rules, for n games at once; it remembers the time and who stands back."""
 
     def __init__(self, games: int) -> None:
         self._games = np.arange(games)
-        self._last = np.full(games, -1)
+        self._standing_back = np.full(games, -1)
         self._time_s = 0.0
 
     def actions(self, chosen: Strategies, sight: Sight) -> Floats:
@@ -88,11 +91,7 @@ class Team:
         across = np.column_stack([-towards[:, 1], towards[:, 0]])
         first, second, third = self._roles(sight.own_xy_m, ball_xy_m - 1.5 * _CONTACT_M * towards)
         wanted_mps = np.zeros_like(sight.own_xy_m)
-        behind_m, beside_m = chosen.formations_m.T
-        follows_xy_m = ball_xy_m - behind_m[:, None] * towards
-        wanted_mps[self._games, third] = _drive(
-            chosen, sight.own_xy_m[self._games, third], follows_xy_m, towards, beside_m * chosen.biases
-        )
+        wanted_mps[self._games, third] = _keep_place(chosen, sight, sight.own_xy_m[self._games, third])
         places_xy_m = sight.own_xy_m[self._games, first], sight.own_xy_m[self._games, second]
         first_is_left = np.sum((places_xy_m[0] - places_xy_m[1]) * across, axis=1) > 0.0
         sides = np.where(first_is_left, 1.0, -1.0)
@@ -112,12 +111,19 @@ class Team:
         return np.asarray(np.where(passing[:, None], mate_xy_m, goal_xy_m))
 
     def _roles(self, own_xy_m: Floats, behind_xy_m: Floats) -> Integers:
-        """Numbers (3, n) of the nearest to the point behind the ball, of the second, and of the last."""
+        """Numbers (3, n) of the nearest to the point behind the ball, of the second, and of who stands back."""
         distances_m = np.linalg.norm(own_xy_m - behind_xy_m[:, None], axis=-1)
-        distances_m += _NEARER_M * (np.arange(3) == self._last[:, None])
+        distances_m += _NEARER_M * (np.arange(3) == self._standing_back[:, None])
         order: Integers = np.argsort(distances_m, axis=1).T
-        self._last = order[2]
+        self._standing_back = order[2]
         return order
+
+
+def _keep_place(chosen: Strategies, sight: Sight, own_xy_m: Floats) -> Floats:
+    """Velocities (n, 2) of those who stand back, to their places in the formation."""
+    places_m = chosen.formations_m * np.column_stack([np.ones_like(chosen.biases), chosen.biases])
+    target_xy_m = np.clip(sight.ball_xy_m + places_m, -_PITCH_M, _PITCH_M)
+    return _limited(_TO_PLACE_1_PER_S * (target_xy_m - own_xy_m), chosen.tempos_mps)
 
 
 def _drive(chosen: Strategies, own_xy_m: Floats, ball_xy_m: Floats, towards: Floats, aside_m: Floats) -> Floats:
