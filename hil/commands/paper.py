@@ -21,6 +21,7 @@ from mtm_onboard.protocol import MtmError
 _PART = 10
 _STRATEGIES = 64
 _FOOTBALL_PART = 10
+_FOOTBALL_COMPARED = 2
 _QUICK_ROLLOUTS = 1
 
 
@@ -39,10 +40,11 @@ class WorldOptions:
     def effort(self, world: str) -> Effort:
         """How much to measure in a world."""
         count = _QUICK_ROLLOUTS if self.quick else self.rollouts
-        headline, others = count, max(1, count // _PART)
+        rollouts = count, count, max(1, count // _PART)
         if world == "football" and not self.quick:
-            headline, others = _STRATEGIES * max(1, count // _FOOTBALL_PART), _STRATEGIES
-        return Effort(headline, others, self.first_seed, self.renderer, self.quick)
+            times = max(1, count // _FOOTBALL_PART)
+            rollouts = _STRATEGIES * times, _STRATEGIES * min(times, _FOOTBALL_COMPARED), _STRATEGIES
+        return Effort(*rollouts, self.first_seed, self.renderer, self.quick)
 
     def command(self, what: str) -> str:
         """The command line."""

@@ -31,19 +31,21 @@ _SIGNIFICANT = 0.05
 WRONG_KEY = "wrong key"
 THROUGH_A_FILE = "from a file"
 # Rollouts that one process takes at once: enough for a simulator that steps them together, few enough to be stopped.
-_BATCH = {"discovery": 10, "lunar-lander": 2, "reacher": 2, "football": 16}
+_BATCH = {"discovery": 10, "lunar-lander": 2, "reacher": 2, "football": 32}
 # Channels that are read from the recordings of "same" as well, since there each body or axis moves by itself.
 _PARTS = {"discovery": ("x",), "football": ("agent0",)}
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much to measure: rollouts at the headline's scheme, and at all other points, from `first_seed` on.
+    """How much to measure, from `first_seed` on.
 
+    Rollouts at the headline point, at shorter messages of its scheme and without a message, and at all other points.
     `quick` leaves the headline point alone, with the shortest messages of the largest alphabet beside it.
     """
 
     headline_rollouts: int
+    compared_rollouts: int
     other_rollouts: int
     first_seed: int
     renderer: str = SOFTWARE
@@ -89,7 +91,8 @@ def conditions_of(world: str, effort: Effort) -> list[Condition]:
         shortest = min(point.message_ticks for point in points)
         points, shorter = [headline_point(world, shortest)], []
     rollouts = dict.fromkeys(points, effort.other_rollouts)
-    rollouts |= dict.fromkeys([*shorter, headline], effort.headline_rollouts)
+    rollouts |= dict.fromkeys(shorter, effort.compared_rollouts)
+    rollouts[headline] = effort.headline_rollouts
     compared = {*shorter, headline}
     found = [
         Condition(
@@ -98,7 +101,7 @@ def conditions_of(world: str, effort: Effort) -> list[Condition]:
         )
         for point, count in rollouts.items()
     ]  # fmt: skip
-    found.append(Condition(headline, effort.headline_rollouts, arm=NO_MESSAGE))
+    found.append(Condition(headline, effort.compared_rollouts, arm=NO_MESSAGE))
     found.append(Condition(headline, min(_BATCH[world], effort.headline_rollouts), frames=FILE))
     return found
 

@@ -71,7 +71,7 @@ def test_a_renderer_that_does_not_exist_is_refused(capsys):
 
 
 def test_all_rollouts_of_the_headline_and_a_part_of_the_others_are_asked_for():
-    conditions = conditions_of("reacher", Effort(50, 5, 0))
+    conditions = conditions_of("reacher", Effort(50, 50, 5, 0))
     counts = {condition.point: condition.rollouts for condition in conditions if condition.arm != NO_MESSAGE}
     assert counts[headline_point("reacher", 60)] == 50
     assert counts[next(cell.point for cell in paper_cells("reacher") if cell.point.arrangement == "split")] == 5
