@@ -2,7 +2,7 @@
 
 import itertools
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 
 import numpy as np
@@ -57,10 +57,7 @@ def read_rollout(parameters: Values, seed: int) -> dict[str, Scalar]:
         scores = _matched(key.codebook(), [until(ONSET_S + message_s, glimpse) for glimpse in longer])
     else:
         scores = _coherency(key.codebook(), longer)
-    sent = channel_symbols(symbols, scheme)
-    return _right(
-        scheme, [_sent_first(own, sent[name.name]) for own, name in zip(scores, scheme.channels, strict=True)]
-    )
+    return right_symbols(scheme, scores, channel_symbols(symbols, scheme))
 
 
 def _matched(codebook: Codebook, glimpses: Sequence[Glimpse]) -> list[Floats]:
@@ -88,6 +85,17 @@ def _coherency(codebook: Codebook, glimpses: Sequence[Glimpse]) -> list[Floats]:
         )
         for channel, glimpse in zip(codebook.scheme.channels, glimpses, strict=True)
     ]  # fmt: skip
+
+
+def right_symbols(scheme: Scheme, scores: Sequence[Floats], sent: Mapping[str, Sequence[int]]) -> dict[str, Scalar]:
+    """How many symbols are right by channel name, and whether the `WHOLE` message is (1 or 0).
+
+    `scores` (symbols, M) are of each channel in order, `sent` its symbols by name. Channels with as many symbols as
+    each other appear pooled too, as they would decode had all sent the same.
+    """
+    return _right(
+        scheme, [_sent_first(own, sent[name.name]) for own, name in zip(scores, scheme.channels, strict=True)]
+    )
 
 
 def _sent_first(scores: Floats, sent: Sequence[int]) -> Floats:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from rich.console import Console
 
@@ -9,7 +10,9 @@ from hil.experiments.accuracy_rollout import WHOLE, read_rollout, rollout_parame
 from hil.experiments.cells import Cell, CellStore, Scalar, Values
 from hil.experiments.paper_robomaster import Proportion
 from hil.experiments.sweep import Compute, run_sweep
+from hil.experiments.world_accuracy import read_world, world_parameters, world_scheme
 from hil.robots.mecanum import calibrated_parameters
+from hil.worlds.registry import NAMES
 from hil.worlds.robomaster import fleet_scheme
 from mtm_audit.planning.table import AccuracyPoint, AccuracyTable, members_of
 from mtm_onboard.protocol import MtmError, Scheme
@@ -40,6 +43,7 @@ WORLDS: dict[str, World] = {
         lambda scheme, detector: rollout_parameters(scheme, detector, calibrated_parameters()),
         read_rollout,
     ),
+    **{name: World(partial(world_scheme, name), partial(world_parameters, name), read_world) for name in NAMES},
 }
 
 
