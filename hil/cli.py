@@ -1,17 +1,14 @@
 """The command line: `mtm-hil <command>`. Exit codes: 0 done, 1 error, 2 usage, 130 interrupted."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from mtm_audit.clierrors import reported
-
-if TYPE_CHECKING:
-    from rich.console import Console
+from hil.clioptions import CELLS_HELP, Renderer, reported_console
+from hil.papercli import paper
 
 app = typer.Typer(
     help="Robots that send messages through motion, simulated with the real onboard software in the loop.",
@@ -34,6 +31,9 @@ class CameraName(StrEnum):
     OVERHEAD = "overhead"
     TILTED = "tilted"
     PHONE = "phone"
+
+
+app.add_typer(paper, name="paper")
 
 
 @app.callback()
@@ -59,7 +59,7 @@ def record(
     """Record four simulated robots: motion capture, video, and what was sent."""
     if (message is None) != no_message:
         raise typer.BadParameter("give either --message N or --no-message")
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.record import RecordOptions
         from hil.commands.record import record as run
 
@@ -68,26 +68,46 @@ def record(
 
 
 @app.command()
+def film(
+    world: Annotated[str, typer.Argument(metavar="WORLD", help="discovery, lunar-lander, reacher or football.")],
+    out: Annotated[Path, typer.Option(help="The folder to make; it must not exist.")],
+    message: Annotated[int | None, typer.Option(metavar="N", help="The message as a number.")] = None,
+    no_message: Annotated[bool, typer.Option("--no-message", help="Move without a message.")] = False,
+    seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Length of the film.")] = 30.0,
+    key: Annotated[Path | None, typer.Option(help="The key file; one is made in the folder without it.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Decides everything random but the message's waveforms.")] = 0,
+    renderer: Annotated[Renderer, typer.Option(help="Who draws: the software camera or the simulator.")] = (
+        Renderer.SOFTWARE
+    ),
+) -> None:
+    """Film one of the paper's simulated worlds while it sends a message on all its channels."""
+    if (message is None) != no_message:
+        raise typer.BadParameter("give either --message N or --no-message")
+    with reported_console() as console:
+        from hil.commands.film import FilmOptions
+        from hil.commands.film import film as run
+
+        run(FilmOptions(world, out, seconds, message, key, seed, renderer.value), console)
+
+
+@app.command()
 def demo(out: Annotated[Path, typer.Option(help="The folder to make; it must not exist.")]) -> None:
     """Send a message, film it, and decode it: the whole way in under a minute."""
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.demo import demo as run
 
         if not run(out, console):
             raise typer.Exit(1)
 
 
-_CELLS_HELP = "Finished rollouts; a run that was interrupted goes on from there."
-
-
 @app.command()
 def calibrate(
     rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each slip and window length.")] = 20,
     out: Annotated[Path | None, typer.Option(help="The plant's file; that of the package by default.")] = None,
-    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/calibrate.jsonl"),
+    cells: Annotated[Path, typer.Option(help=CELLS_HELP)] = Path("out/cells/calibrate.jsonl"),
 ) -> None:
     """Fit the simulated chassis' wheel slip to the paper's margins."""
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.calibrate import calibrate as run
 
         run(rollouts, out, cells, console)
@@ -99,10 +119,10 @@ def bench(
     quick: Annotated[bool, typer.Option("--quick", help="A few rollouts of a few lines, for a first look.")] = False,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
     plot: Annotated[Path | None, typer.Option(help="A picture to draw: accuracy over the window length.")] = None,
-    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/bench.jsonl"),
+    cells: Annotated[Path, typer.Option(help=CELLS_HELP)] = Path("out/cells/bench.jsonl"),
 ) -> None:
     """Compare the detectors, the paper's and ours, with the limit, on the same recordings."""
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.bench import BenchOptions
         from hil.commands.bench import bench as run
 
@@ -116,10 +136,10 @@ def false_alarms(
     seed: Annotated[int, typer.Option(min=0, help="The first rollout's seed.")] = 500_000,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
-    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/false-alarms.jsonl"),
+    cells: Annotated[Path, typer.Option(help=CELLS_HELP)] = Path("out/cells/false-alarms.jsonl"),
 ) -> None:
     """Decode recordings that hold nothing under the key asked, and see how the p-values are spread."""
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.false_alarms import false_alarms as run
 
         run(decodes, detector, seed, workers, out, cells, console)
@@ -131,10 +151,10 @@ def messages(
     seed: Annotated[int, typer.Option(min=0, help="The first rollout's seed.")] = 700_000,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
-    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/messages.jsonl"),
+    cells: Annotated[Path, typer.Option(help=CELLS_HELP)] = Path("out/cells/messages.jsonl"),
 ) -> None:
     """Send framed messages and see how many are received, whole, by the clock, and through occlusions."""
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.messages import messages as run
 
         run(rollouts, seed, workers, out, cells, console)
@@ -146,10 +166,10 @@ def frames(
     seed: Annotated[int, typer.Option(min=0, help="The first cell's seed.")] = 0,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
-    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/frames.jsonl"),
+    cells: Annotated[Path, typer.Option(help=CELLS_HELP)] = Path("out/cells/frames.jsonl"),
 ) -> None:
     """Decode noisy and attacked frames: how often a wrong payload passes the check, and which decoder reads most."""
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.frames import frames as run
 
         run(count, seed, workers, out, cells, console)
@@ -159,10 +179,10 @@ def frames(
 def shim(
     rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts, each run with Python and with the shim.")] = 100,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
-    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/shim.jsonl"),
+    cells: Annotated[Path, typer.Option(help=CELLS_HELP)] = Path("out/cells/shim.jsonl"),
 ) -> None:
     """Play the message with the microcontroller's C code, in the loop, and compare with Python."""
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.shim import shim as run
 
         run(rollouts, out, cells, console)
@@ -174,10 +194,10 @@ def robustness(
     seed: Annotated[int, typer.Option(min=0, help="The first rollout's seed.")] = 600_000,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
-    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/robustness.jsonl"),
+    cells: Annotated[Path, typer.Option(help=CELLS_HELP)] = Path("out/cells/robustness.jsonl"),
 ) -> None:
     """Read the same rollouts through cameras, frames and clocks that nobody calibrated."""
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.robustness import robustness as run
 
         run(rollouts, seed, workers, out, cells, console)
@@ -205,10 +225,10 @@ def sweep(
     detector: Annotated[str, typer.Option(help="Which detector decodes: matched or coherency.")] = "matched",
     first_seed: Annotated[int, typer.Option(min=0, help="The first rollout's seed.")] = 700_000,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
-    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/sweep.jsonl"),
+    cells: Annotated[Path, typer.Option(help=CELLS_HELP)] = Path("out/cells/sweep.jsonl"),
 ) -> None:
     """Measure how often a symbol is right, by channel, alphabet size and window length."""  # fmt: skip
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.sweep import SweepOptions
         from hil.commands.sweep import sweep as run
 
@@ -234,10 +254,10 @@ def faults(
     seed: Annotated[int, typer.Option(min=0, help="The first run's seed.")] = 0,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
-    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/faults.jsonl"),
+    cells: Annotated[Path, typer.Option(help=CELLS_HELP)] = Path("out/cells/faults.jsonl"),
 ) -> None:
     """Run a robot under every fault of its wire, alone and with a lost link: stops, stale commands, the message."""
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.faults import faults as run
 
         if not run(seeds, seed, workers, out, cells, console):
@@ -250,10 +270,10 @@ def fuzz(
     seed: Annotated[int, typer.Option(min=0, help="The first cell's seed.")] = 0,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")] = None,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
-    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/fuzz.jsonl"),
+    cells: Annotated[Path, typer.Option(help=CELLS_HELP)] = Path("out/cells/fuzz.jsonl"),
 ) -> None:
     """Feed damaged traffic to the transports and the simulated robots, and see what they take for sound."""
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.fuzz import fuzz as run
 
         if not run(inputs, seed, workers, out, cells, console):
@@ -268,75 +288,10 @@ def endurance(
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
 ) -> None:
     """Run one robot for a day in simulated time: memory, journal, ticks, and the message in each last minute."""
-    with _reported() as console:
+    with reported_console() as console:
         from hil.commands.endurance import endurance as run
 
         run(hours, checkpoints, seed, out, console)
-
-
-paper = typer.Typer(help="The paper's tables, measured on the simulated robots.", no_args_is_help=True)
-app.add_typer(paper, name="paper")
-
-
-@paper.command("robomaster")
-def paper_robomaster(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each row of the table.")] = 40,
-    quick: Annotated[bool, typer.Option("--quick", help="Five rollouts, for a first look.")] = False,
-    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
-    cells: Annotated[Path, typer.Option(help=_CELLS_HELP)] = Path("out/cells/robomaster.jsonl"),
-) -> None:
-    """Accuracy and margin over the window length, with a wrong key and without a message, beside the paper's."""
-    with _reported() as console:
-        from hil.commands.paper import paper_robomaster as run
-
-        run(5 if quick else rollouts, out, cells, console)
-
-
-_Rollouts = Annotated[
-    int,
-    typer.Option("-n", min=1, help="Rollouts at the headline's scheme, Football 64 for each ten; others take a part."),
-]
-_Quick = Annotated[bool, typer.Option("--quick", help="One rollout of a few points, for a first look.")]
-_Seed = Annotated[int, typer.Option(min=0, help="The first rollout's seed.")]
-_Renderer = Annotated[str, typer.Option(help="Who draws the pictures: software, or native (the simulator itself).")]
-_Workers = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")]
-_Cells = Annotated[Path, typer.Option(help=_CELLS_HELP)]
-
-
-def _paper_worlds(
-    context: typer.Context,
-    rollouts: _Rollouts = 50,
-    quick: _Quick = False,
-    seed: _Seed = 10_000,
-    renderer: _Renderer = "software",
-    workers: _Workers = None,
-    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well; a folder for all.")] = None,
-    cells: _Cells = Path("out/cells/worlds.jsonl"),
-) -> None:
-    with _reported() as console:
-        from hil.commands.paper import WorldOptions, paper_table
-
-        paper_table(str(context.info_name), WorldOptions(rollouts, quick, seed, renderer, workers, out, cells), console)
-
-
-for _name, _help in {
-    "discovery": "A navigating agent from video: both detectors beside the paper's figures.",
-    "lunar-lander": "A lander over its pads from video: both detectors beside the paper's figures.",
-    "reacher": "A two-link arm from video: both detectors beside the paper's figures.",
-    "football": "A team of three from video: both detectors beside the paper's figures.",
-    "null": "All simulated worlds with wrong keys and without a message.",
-    "performance": "What the noise costs the tasks: the paper's measures, energy, jerk, commands at the limit.",
-    "all": "All tables of the simulated worlds.",
-}.items():
-    paper.command(_name, help=_help)(_paper_worlds)
-
-
-@contextmanager
-def _reported() -> Iterator["Console"]:
-    from rich.console import Console
-
-    with reported("mtm-hil", "no half-written result is left"):
-        yield Console()
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -30,8 +30,6 @@ SENT, NO_MESSAGE = "message", "no message"
 MEMORY, FILE = "memory", "file"
 SOFTWARE, NATIVE = "software", "native"
 SECONDS = "seconds"
-# Wrong keys that try each rollout.
-DECOYS = 5
 
 # Rollouts that teach the genie; their seeds count from 0, far from any that is reported.
 _LESSONS = {"discovery": 8, "lunar-lander": 6, "reacher": 6, "football": 12}
@@ -52,7 +50,7 @@ def rollout_parameters(
     """Parameters of a cell for `decode_batch`: `batch` rollouts from the cell's seed on.
 
     `parts` names the first channel when a "same" arrangement is decoded from that alone as well, `decoys` is how many
-    wrong keys try each rollout, and `frames` says whether they pass through a video file on the way.
+    wrong keys try each rollout as it was recorded, and `frames` says whether they pass through a video file on the way.
     """
     return {
         **point.parameters(), "batch": batch, "detectors": "+".join(detectors), "arm": arm, "decoys": decoys,
@@ -82,7 +80,8 @@ def decode_batch(parameters: Values, seed: int) -> dict[str, Scalar]:
             for arrangement in arrangements if detector != GENIE else arrangements[:1]:
                 part = point.of_arrangement(arrangement)
                 looked_at = seen if part == point else _narrowed(seen, part.scheme)
-                for name, value in _decoded(part, own, looked_at, symbols, detector):
+                tried = own if part == point else own[:1]
+                for name, value in _decoded(part, tried, looked_at, symbols, detector):
                     results.setdefault(f"{detector} {arrangement} {name}", []).append(value)
     lists = {name: json.dumps(values) for name, values in results.items()}
     return {**lists, SECONDS: time.process_time() - started_s}

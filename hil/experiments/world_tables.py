@@ -15,7 +15,6 @@ from hil.experiments.world_genie import GENIE
 from hil.experiments.world_points import HEADLINES, PaperCell, Point, headline_point, paper_cells
 from hil.experiments.world_reading import COHERENCY, MATCHED
 from hil.experiments.world_rollout import (
-    DECOYS,
     FILE,
     MEMORY,
     NO_MESSAGE,
@@ -32,6 +31,8 @@ WRONG_KEY = "wrong key"
 THROUGH_A_FILE = "from a file"
 # Rollouts that one process takes at once: enough for a simulator that steps them together, few enough to be stopped.
 _BATCH = {"discovery": 10, "lunar-lander": 2, "reacher": 2, "football": 32}
+# Wrong keys that try each rollout; each of Football's costs as much as its film.
+_DECOYS = {"discovery": 5, "lunar-lander": 5, "reacher": 5, "football": 1}
 # Channels that are read from the recordings of "same" as well, since there each body or axis moves by itself.
 _PARTS = {"discovery": ("x",), "football": ("agent0",)}
 
@@ -97,7 +98,7 @@ def conditions_of(world: str, effort: Effort) -> list[Condition]:
     found = [
         Condition(
             point, count, (*DETECTORS, GENIE) if point in compared else DETECTORS,
-            decoys=DECOYS if point == headline else 0,
+            decoys=_DECOYS[world] if point == headline else 0,
         )
         for point, count in rollouts.items()
     ]  # fmt: skip
@@ -193,7 +194,7 @@ def _rows(world: str, condition: Condition, results: dict[str, list[float]]) -> 
         goals = Proportion(int(sum(own["goals"])), trials)
         reported = paper.get(point) if arm == SENT else None
         yield Row(arm, point, detector, condition.rollouts, goals, symbols, margin, reported)
-        if condition.decoys and detector != GENIE:
+        if f"{detector} {arrangement} wrong" in results:
             wrong = int(sum(results[f"{detector} {arrangement} wrong"]))
             tried = Proportion(wrong, symbols.trials * condition.decoys)
             yield Row(WRONG_KEY, point, detector, condition.rollouts, None, tried)

@@ -66,8 +66,8 @@ def test_a_second_look_computes_nothing_again(quick_table, tmp_path, monkeypatch
 def test_a_renderer_that_does_not_exist_is_refused(capsys):
     with pytest.raises(SystemExit) as leaving:
         main(["paper", "reacher", "--quick", "--renderer", "crayon"])
-    assert leaving.value.code == 1
-    assert "no renderer 'crayon'; choose software or native" in capsys.readouterr().err
+    assert leaving.value.code == 2
+    assert "'crayon' is not one of 'software', 'native'" in " ".join(capsys.readouterr().err.split())
 
 
 def test_all_rollouts_of_the_headline_and_a_part_of_the_others_are_asked_for():

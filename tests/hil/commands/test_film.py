@@ -1,0 +1,45 @@
+import json
+
+import pytest
+
+from hil.cli import main
+from mtm_audit.cli import main as audit
+from mtm_onboard.protocol import generate_key, save_key
+from tests.audit.moving_robot import scheme_of
+
+
+def filmed(capsys, *arguments):
+    """Run `mtm-hil film`; gives the exit code, standard output and standard error."""
+    with pytest.raises(SystemExit) as leaving:
+        main(["film", *map(str, arguments)])
+    captured = capsys.readouterr()
+    return leaving.value.code or 0, captured.out, captured.err
+
+
+def test_a_filmed_lander_s_message_is_decoded_with_the_tracker_that_the_film_names(tmp_path, capsys):
+    out = tmp_path / "lander"
+    code, said, _ = filmed(capsys, "lunar-lander", "--out", out, "--message", 6, "--seconds", 30)
+    assert code == 0
+    assert "decode it with --tracker brightness:0,0,600,200" in said
+    with pytest.raises(SystemExit) as leaving:
+        audit(["decode", str(out / "video.mp4"), "--key", str(out / "robot.key"), "--json",
+               "--tracker", "brightness:0,0,600,200", "--onset", "0"])  # fmt: skip
+    assert leaving.value.code in (0, None)
+    decoded = json.loads(capsys.readouterr().out)
+    assert (decoded["verdict"], decoded["message"]) == ("decoded", 6)
+    assert json.loads((out / "truth.json").read_text())["message"] == 6
+
+
+def test_a_key_for_something_else_is_refused_and_leaves_nothing(tmp_path, capsys):
+    save_key(generate_key("other", scheme_of()), tmp_path / "other.key")
+    out = tmp_path / "arm"
+    code, _, error = filmed(capsys, "reacher", "--out", out, "--no-message", "--key", tmp_path / "other.key")
+    assert code == 1
+    assert "reacher has no axis" in error
+    assert not out.exists()
+
+
+def test_a_film_needs_a_message_or_none(tmp_path, capsys):
+    code, _, error = filmed(capsys, "reacher", "--out", tmp_path / "arm")
+    assert code == 2
+    assert "give either --message N or --no-message" in error
