@@ -18,12 +18,12 @@ def filmed(capsys, *arguments):
 
 def test_a_filmed_lander_s_message_is_decoded_with_the_tracker_that_the_film_names(tmp_path, capsys):
     out = tmp_path / "lander"
-    code, said, _ = filmed(capsys, "lunar-lander", "--out", out, "--message", 6, "--seconds", 30)
+    code, said, _ = filmed(capsys, "lunar-lander", "--out", out, "--message", 6, "--seconds", 40)
     assert code == 0
     assert "decode it with --tracker brightness:0,0,600,200" in said
     with pytest.raises(SystemExit) as leaving:
         audit(["decode", str(out / "video.mp4"), "--key", str(out / "robot.key"), "--json",
-               "--tracker", "brightness:0,0,600,200", "--onset", "0"])  # fmt: skip
+               "--tracker", "brightness:0,0,600,200"])  # fmt: skip
     assert leaving.value.code in (0, None)
     decoded = json.loads(capsys.readouterr().out)
     assert (decoded["verdict"], decoded["message"]) == ("decoded", 6)

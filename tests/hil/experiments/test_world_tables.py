@@ -67,7 +67,7 @@ def test_a_renderer_that_does_not_exist_is_refused(capsys):
     with pytest.raises(SystemExit) as leaving:
         main(["paper", "reacher", "--quick", "--renderer", "crayon"])
     assert leaving.value.code == 2
-    assert "'crayon' is not one of 'software', 'native'" in " ".join(capsys.readouterr().err.split())
+    assert "'crayon' is not one of" in capsys.readouterr().err
 
 
 def test_all_rollouts_of_the_headline_and_a_part_of_the_others_are_asked_for():
