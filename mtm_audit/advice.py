@@ -7,6 +7,9 @@ from mtm_audit.recordings.recording import Recording
 from mtm_onboard.protocol.framing import payload_bits
 
 _LONGEST_FACTOR = 10.0
+# A recording without a message has a p-value below this once in a hundred.
+_NEARLY = 0.01
+_MORE_DECOYS = 5
 
 
 def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
@@ -17,6 +20,7 @@ def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
         return (
             "Either nobody sent one, or it was sent with another key, or the recording is too short or too coarse to "
             "show it.",
+            *_of_the_nearly_found(decoding),
         )
     if decoding.scheme.framing is not None:
         return (_of_the_frame(decoding),)
@@ -32,6 +36,17 @@ def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
             f"{(1 << payload_bits(decoding.scheme)) - 1}; the robot was perhaps given symbols instead of a number.",
         )
     return tuple(_of_the_uncertain(recording, decoding))
+
+
+def _of_the_nearly_found(decoding: Decoding) -> tuple[str, ...]:
+    """A tail known from few decoys is taken for heavy, so that more of them may show the same evidence to be rare."""
+    if decoding.evidence.p_value > _NEARLY:
+        return ()
+    decoys = _MORE_DECOYS * len(decoding.evidence.decoy_strengths)
+    return (
+        f"Chance seldom comes so near, though: do not take it for absent before more decoy keys (--decoys {decoys}) or "
+        "a longer recording have said so too.",
+    )
 
 
 def _of_the_frame(decoding: Decoding) -> str:

@@ -79,6 +79,15 @@ def test_a_track_too_short_to_read_is_remarked_beside_one_that_was_read():
     assert decoding.symbols[1] is None
 
 
+@pytest.mark.parametrize(("p_value", "sentences"), [(0.5, 1), (0.011, 1), (0.009, 2), (0.0002, 2)])
+def test_a_message_that_is_nearly_found_is_not_passed_off_as_absent(p_value, sentences):
+    _, _, decoding = told(robot_track(KEY, "robot0", None, 20.0), decoys=20)
+    near = replace(decoding, verdict="absent", evidence=replace(decoding.evidence, p_value=p_value))
+    said = advice(Recording((Path("recording.tum"),), "motion capture", (track(),)), near)
+    assert len(said) == sentences
+    assert sentences == 1 or "more decoy keys (--decoys 100)" in said[1]
+
+
 def test_an_absent_message_is_not_given_advice_about_symbols():
     wrong = key_of(KEY.scheme, b"one more fake secret, only tests")
     recording = Recording((Path("a.tum"),), "motion capture", (track(0), track(1)))
