@@ -2,13 +2,15 @@
 
 Each window's symbol is judged under what all other windows say about the plant, never under what itself says, so
 that a wrong decision does not confirm itself. Windows of other observations (other robots of a fleet, filmed by the
-same camera) count as one hypothesis beside the one that they are strangers.
+same camera) count as one hypothesis beside the one that they are strangers, and so does that all observed axes answer
+alike (a robot on wheels, seen from anywhere) beside the one that each has a plant of its own (a lander's engines).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import log_softmax, softmax
 
 from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, half_log_evidence, log_sum_exp
 from mtm_audit.detectors.matched.motion import Motion
@@ -100,9 +102,11 @@ def _first_pass(window: Window, motion: Motion, noise: NoiseModel, log_plants: F
     found = statistics(window, window.tones, response_rows(window, COARSE), noise, motion.velocities)
     axes = window.tones.shape[1]
     gains = np.eye(axes) / GAIN_VARIANCE
-    evidence = half_log_evidence(gains + found.precision, found.information).sum(axis=0)
+    evidence = half_log_evidence(gains + found.precision, found.information)
     constant = found.information.shape[0] * 0.5 * axes * np.log(GAIN_VARIANCE)
-    ratios = log_sum_exp(evidence + log_plants, axis=1) - constant
+    alike = log_sum_exp(evidence.sum(axis=0) + log_plants, axis=1)
+    apart = log_sum_exp(evidence + log_plants, axis=2).sum(axis=0)
+    ratios = np.logaddexp(alike, apart) - np.log(2.0) - constant
     silent = np.zeros((len(motion.velocities), window.last - window.first))
     return _Judged(window, np.arange(len(ratios)), response_rows(window, FINE), ratios, ratios, ratios, silent)
 
@@ -144,9 +148,9 @@ def _all_statistics(judged: Sequence[_Judged], motions: Sequence[Motion], noise:
 
 @dataclass(frozen=True)
 class _Hypothesis:
-    """A plant posterior for one window: weight of the hypothesis, of each plant, and mean gains (axes, plants, A)."""
+    """What one hypothesis says of one window: ratios (L,), plants (axes, plants), mean gains (axes, plants, A)."""
 
-    weight: float
+    ratios: Floats
     plants: Floats
     gains: Floats
 
@@ -181,38 +185,45 @@ def _judge(judged: Sequence[_Judged], found: Sequence[Statistics], prior: Floats
         sources = [own_totals[state.window.observation]]
         if len(own_totals) > 1:
             sources.append(totals)
-        ratios, hypotheses = [], []
-        for source in sources:
-            values, plants, gains = _under(data, source[0] - entry[0], source[1] - entry[1], prior)
-            ratios.append(values)
-            hypotheses.append((float(log_sum_exp(values, axis=0)), plants, gains))
-        state.ratios = log_sum_exp(np.stack(ratios), axis=0) - np.log(len(ratios))
-        top = max(weight for weight, _, _ in hypotheses)
-        norm = sum(np.exp(weight - top) for weight, _, _ in hypotheses)
-        results.append([_Hypothesis(float(np.exp(w - top) / norm), p, g) for w, p, g in hypotheses])
+        hypotheses = [
+            hypothesis
+            for source in sources
+            for hypothesis in _under(data, source[0] - entry[0], source[1] - entry[1], prior)
+        ]
+        ratios = np.stack([hypothesis.ratios for hypothesis in hypotheses])
+        state.ratios = log_sum_exp(ratios, axis=0) - np.log(len(ratios))
+        results.append(hypotheses)
     return results
 
 
-def _under(data: Statistics, precision: Floats, information: Floats, prior: Floats) -> tuple[Floats, Floats, Floats]:
-    """Ratios (L,) under a plant known by `precision` (axes, plants, A, A), `information` (axes, plants, A) and the log
-    `prior` (plants,).
+def _under(data: Statistics, precision: Floats, information: Floats, prior: Floats) -> list[_Hypothesis]:
+    """What follows from a plant known by `precision` (axes, plants, A, A), `information` (axes, plants, A) and the log
+    `prior` (plants,): once for all observed axes alike, and with more than one of them once for each apart.
     """
     axes = information.shape[-1]
     known = np.eye(axes) / GAIN_VARIANCE + precision
     alone = half_log_evidence(known, information)
-    per_plant = alone.sum(axis=0) + prior
-    plants = np.exp(per_plant - log_sum_exp(per_plant, axis=0))
-    both = half_log_evidence(known[:, None] + data.precision, information[:, None] + data.information)
-    ratios = log_sum_exp((both - alone[:, None]).sum(axis=0) + np.log(plants + 1e-300), axis=1)
     gains = np.linalg.solve(known, information[..., None])[..., 0]
-    return ratios, plants, gains
+    gained = half_log_evidence(known[:, None] + data.precision, information[:, None] + data.information)
+    gained -= alone[:, None]
+    shared = np.asarray(log_softmax(alone.sum(axis=0) + prior))
+    alike = log_sum_exp(gained.sum(axis=0) + shared, axis=1)
+    hypotheses = [_Hypothesis(alike, np.broadcast_to(np.exp(shared), alone.shape), gains)]
+    if len(alone) > 1:
+        own = np.asarray(log_softmax(alone + prior, axis=1))
+        apart = log_sum_exp(gained + own[:, None], axis=2).sum(axis=0)
+        hypotheses.append(_Hypothesis(apart, np.exp(own), gains))
+    return hypotheses
 
 
 def _expect_signals(judged: Sequence[_Judged], hypotheses: Sequence[list[_Hypothesis]], noise: NoiseModel) -> None:
     for state, alternatives in zip(judged, hypotheses, strict=True):
         tones = np.einsum("l,lak->ak", state.belief, state.window.tones[state.kept])
         heard = np.einsum("ak,pkn->pan", tones, state.rows)
-        gains = sum(item.weight * item.plants[None, :, None] * item.gains for item in alternatives)
+        weights = softmax([float(log_sum_exp(item.ratios, axis=0)) for item in alternatives])
+        gains = sum(
+            weight * item.plants[..., None] * item.gains for weight, item in zip(weights, alternatives, strict=True)
+        )
         scales = noise.scales[state.window.observation]
         state.signal = np.einsum("dpa,pan->dn", gains, heard) * scales[:, None]
 

@@ -1,10 +1,12 @@
 """What the robot and the camera may do to a waveform: a family of short filters, and tones passed through them.
 
-Every member is a pure delay and a first-order lag of unit gain at zero frequency; gains, signs and mixing of axes
-are left to the estimate. Impulse responses are sampled every hundredth of a second.
+Every member is a pure delay and a first-order lag; some give back after a while what they have followed, as a robot
+does whose controller holds a place against the noise. Gains, signs and mixing of axes are left to the estimate. Impulse
+responses are sampled every hundredth of a second.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,25 +23,49 @@ TAIL_S = 0.5
 
 @dataclass(frozen=True)
 class Plants:
-    """A family of impulse responses: `taps` (plants, taps), each of sum 1, with the delay and lag of each."""
+    """A family of impulse responses: `taps` (plants, taps), with the delay and lag of each.
+
+    `returns_s` is the time constant with which a plant gives back what it follows, infinite where it does not and the
+    taps' sum is 1.
+    """
 
     delays_s: Floats
     lags_s: Floats
+    returns_s: Floats
     taps: Floats
 
 
 def plant_family(delays_s: Floats, lags_s: Floats) -> Plants:
-    """All pairs of the delays and lags."""
+    """All pairs of the delays and lags, of unit gain at zero frequency."""
     delays, lags = (grid.ravel() for grid in np.meshgrid(delays_s, lags_s, indexing="ij"))
     instants_s = np.arange(0.0, MEMORY_S, TAP_S) + TAP_S / 2.0
     since_s = instants_s[None, :] - delays[:, None]
     taps = np.where(since_s >= 0.0, np.exp(-np.maximum(since_s, 0.0) / lags[:, None]), 0.0)
-    return Plants(delays, lags, taps / taps.sum(axis=1, keepdims=True))
+    return Plants(delays, lags, np.full(len(delays), np.inf), taps / taps.sum(axis=1, keepdims=True))
 
 
-# Prior ranges: delay 1 to 8 ticks of a 50 Hz loop, lag 0.05 to 0.4 s.
-COARSE = plant_family(np.array([0.02, 0.06, 0.10, 0.14]), np.array([0.06, 0.13, 0.28]))
-FINE = plant_family(np.arange(0.0, 0.17, 0.03), np.array([0.05, 0.1, 0.2, 0.4]))
+def returning(family: Plants, returns_s: Sequence[float]) -> Plants:
+    """The family's plants followed by a first-order high pass, once for each of its time constants `returns_s`."""
+    since_s = np.arange(family.taps.shape[1]) * TAP_S + TAP_S / 2.0
+    taps = []
+    for return_s in returns_s:
+        given_back = np.exp(-since_s / return_s) * TAP_S / return_s
+        taps += [own - np.convolve(own, given_back)[: len(own)] for own in family.taps]
+    times, count = len(returns_s), len(family.taps)
+    return Plants(np.tile(family.delays_s, times), np.tile(family.lags_s, times), np.repeat(returns_s, count),
+                  np.array(taps))  # fmt: skip
+
+
+def joined(one: Plants, other: Plants) -> Plants:
+    """The plants of both families."""
+    return Plants(*(np.concatenate([getattr(one, field.name), getattr(other, field.name)]) for field in fields(Plants)))
+
+
+# Prior ranges: delay 1 to 8 ticks of a 50 Hz loop, lag 0.05 to 0.4 s; and the noise undone with a tenth of a second or
+# a third, for which a few delays and lags will do.
+_RETURNING = returning(plant_family(np.array([0.02, 0.10]), np.array([0.06, 0.28])), (0.1, 0.3))
+COARSE = joined(plant_family(np.array([0.02, 0.06, 0.10, 0.14]), np.array([0.06, 0.13, 0.28])), _RETURNING)
+FINE = joined(plant_family(np.arange(0.0, 0.17, 0.03), np.array([0.05, 0.1, 0.2, 0.4])), _RETURNING)
 
 
 def tone_responses(plants: Plants, tones_hz: Floats, since_start_s: Floats, length_s: float) -> Complexes:

@@ -3,9 +3,9 @@
 The file holds nothing of the key, the message, the camera or the place: for each plant of the family its probability,
 as TOML:
 
-    format = 1
+    format = 2
     plants = [
-        {delay_s = 0.06, lag_s = 0.1, weight = 0.93},
+        {delay_s = 0.06, lag_s = 0.1, return_s = inf, weight = 0.93},
         ...
     ]
 """
@@ -23,7 +23,7 @@ from mtm_audit.tracks import Floats
 from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
 
-PROFILE_FORMAT = 1
+PROFILE_FORMAT = 2
 # The next robot of the type is another one, with another load on another floor.
 _TRUST = 0.9
 _LARGEST_FILE = 1_000_000
@@ -37,8 +37,13 @@ class PlantProfile:
 
 
 def log_prior(profile: PlantProfile | None, plants: Plants) -> Floats:
-    """Log prior of each of `plants`: what is known counts for its nearest and rules none out; else all are equal."""
-    prior = np.full(len(plants.taps), 1.0 / len(plants.taps))
+    """Log prior of each of `plants`: what is known counts for its nearest and rules none out.
+
+    Else each time constant of returning, none at all being one of them, is as likely as the others, and so are the
+    plants of each.
+    """
+    _, kinds, counts = np.unique(plants.returns_s, return_inverse=True, return_counts=True)
+    prior = 1.0 / (len(counts) * counts[kinds])
     if profile is not None:
         differences = np.sum((FINE.taps[:, None] - plants.taps[None]) ** 2, axis=2)
         prior *= 1.0 - _TRUST
@@ -49,8 +54,10 @@ def log_prior(profile: PlantProfile | None, plants: Plants) -> Floats:
 def profile_text(profile: PlantProfile) -> str:
     """The profile file's text."""
     rows = [
-        f"    {{delay_s = {delay_s:.4g}, lag_s = {lag_s:.4g}, weight = {weight:.6f}}},"
-        for delay_s, lag_s, weight in zip(FINE.delays_s, FINE.lags_s, profile.weights, strict=True)
+        f"    {{delay_s = {delay_s:.4g}, lag_s = {lag_s:.4g}, return_s = {return_s:.4g}, weight = {weight:.6f}}},"
+        for delay_s, lag_s, return_s, weight in zip(
+            FINE.delays_s, FINE.lags_s, FINE.returns_s, profile.weights, strict=True
+        )
     ]
     return "\n".join([f"format = {PROFILE_FORMAT}", "plants = [", *rows, "]"]) + "\n"
 
@@ -85,18 +92,18 @@ def load_profile(path: Path) -> PlantProfile:
 
 def _weight(path: Path, row: Any, number: int) -> float:
     """The weight in one row, which must be that of the family's plant of the same number."""
-    fields = ("delay_s", "lag_s", "weight")
+    fields = ("delay_s", "lag_s", "return_s", "weight")
     if not isinstance(row, dict) or set(row) != set(fields):
         raise MtmError(f"{path}: plant {number + 1} must have {', '.join(fields)} and nothing else; make it anew")
     values = [row[name] for name in fields]
     if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         raise MtmError(f"{path}: plant {number + 1} holds something that is not a number; make it anew")
-    expected = (float(FINE.delays_s[number]), float(FINE.lags_s[number]))
-    if not all(math.isclose(value, other, abs_tol=1e-4) for value, other in zip(values[:2], expected, strict=True)):
+    expected = [float(own[number]) for own in (FINE.delays_s, FINE.lags_s, FINE.returns_s)]
+    if not all(math.isclose(value, other, abs_tol=1e-4) for value, other in zip(values[:3], expected, strict=True)):
         raise MtmError(f"{path}: plant {number + 1} is none of this program's; make it anew with mtm-audit profile")
-    if not 0.0 <= values[2] <= 1.0:
-        raise MtmError(f"{path}: the weight of plant {number + 1} is {values[2]} and must lie in 0 to 1; make it anew")
-    return float(values[2])
+    if not 0.0 <= values[3] <= 1.0:
+        raise MtmError(f"{path}: the weight of plant {number + 1} is {values[3]} and must lie in 0 to 1; make it anew")
+    return float(values[3])
 
 
 def _read_toml(path: Path) -> dict[str, Any]:

@@ -1,20 +1,32 @@
 import numpy as np
 import pytest
 
-from mtm_audit.detectors.matched.plants import COARSE, FINE, MEMORY_S, TAP_S, plant_family, tone_responses
+from mtm_audit.detectors.matched.plants import (
+    COARSE,
+    FINE,
+    MEMORY_S,
+    TAP_S,
+    joined,
+    plant_family,
+    returning,
+    tone_responses,
+)
 
 TONES_HZ = np.array([0.5, 1.7, 4.6])
 LENGTH_S = 2.0
 STEP_S = 0.0005
 
 
-def by_quadrature(delay_s, lag_s, tone_hz, instant_s):
-    """The convolution integral of a delayed first-order lag with a tone that sounds from 0 to LENGTH_S."""
-    ago_s = np.arange(delay_s, MEMORY_S, STEP_S) + STEP_S / 2.0
-    kernel = np.exp(-(ago_s - delay_s) / lag_s)
+def by_quadrature(delay_s, lag_s, return_s, tone_hz, instant_s):
+    """The convolution integral of a delayed first-order lag, and a high pass, with a tone from 0 to LENGTH_S."""
+    ago_s = np.arange(0.0, MEMORY_S, STEP_S) + STEP_S / 2.0
+    kernel = np.where(ago_s > delay_s, np.exp(-(ago_s - delay_s) / lag_s), 0.0)
+    kernel /= kernel.sum()
+    if np.isfinite(return_s):
+        kernel = kernel - np.convolve(kernel, np.exp(-ago_s / return_s) * STEP_S / return_s)[: len(kernel)]
     played_s = instant_s - ago_s
     sounding = (played_s >= 0.0) & (played_s < LENGTH_S)
-    return np.sum(kernel * np.exp(2j * np.pi * tone_hz * played_s) * sounding) / kernel.sum()
+    return np.sum(kernel * np.exp(2j * np.pi * tone_hz * played_s) * sounding)
 
 
 @pytest.mark.parametrize(
@@ -29,11 +41,12 @@ def by_quadrature(delay_s, lag_s, tone_hz, instant_s):
 def test_tones_through_plants_are_the_convolution_integral(family, instants_s):
     heard = tone_responses(family, TONES_HZ, np.array(instants_s), LENGTH_S)
     assert heard.shape == (len(family.taps), 3, len(instants_s))
-    for plant, (delay_s, lag_s) in enumerate(zip(family.delays_s, family.lags_s, strict=True)):
+    plants = zip(family.delays_s, family.lags_s, family.returns_s, strict=True)
+    for plant, times_s in enumerate(plants):
         for tone, tone_hz in enumerate(TONES_HZ):
-            expected = [by_quadrature(delay_s, lag_s, tone_hz, instant_s) for instant_s in instants_s]
+            expected = [by_quadrature(*times_s, tone_hz, instant_s) for instant_s in instants_s]
             # Taps every hundredth of a second: the first one of a short lag holds its energy half a tap late.
-            assert np.abs(heard[plant, tone] - expected).max() < 0.02
+            assert np.abs(heard[plant, tone] - expected).max() < (0.02 if np.isinf(times_s[2]) else 0.05)
 
 
 def test_before_the_window_and_long_after_it_nothing_sounds():
@@ -54,3 +67,21 @@ def test_a_family_holds_every_pair_once():
     ]  # fmt: skip
     assert family.taps.sum(axis=1) == pytest.approx(1.0)
     assert np.all(family.taps[3:, : round(0.1 / TAP_S)] == 0.0)
+
+
+def test_what_returns_follows_at_once_and_not_for_good():
+    plain = plant_family(np.array([0.02]), np.array([0.06]))
+    family = returning(plain, (0.1, 0.3))
+    assert family.returns_s.tolist() == [0.1, 0.3]
+    heard = tone_responses(family, np.array([0.0]), np.array([0.1, 0.79]), LENGTH_S)[:, 0].real
+    assert np.all(heard[:, 0] > 0.2)
+    assert np.all(np.abs(heard[:, 1]) < [0.02, 0.12])
+    assert family.taps[0] == pytest.approx(returning(plain, (0.1,)).taps[0])
+
+
+def test_joined_families_are_one_after_the_other():
+    plain = plant_family(np.array([0.02, 0.1]), np.array([0.05]))
+    both = joined(plain, returning(plain, (0.2,)))
+    assert both.delays_s.tolist() == [0.02, 0.1, 0.02, 0.1]
+    assert both.returns_s.tolist() == [np.inf, np.inf, 0.2, 0.2]
+    assert len(both.taps) == len(COARSE.taps[:4])

@@ -27,8 +27,12 @@ def test_a_file_gives_back_what_was_written(tmp_path_factory, weights):
     assert load_profile(path).weights == pytest.approx(weights / weights.sum(), abs=1e-5)
 
 
-def test_without_a_profile_all_plants_are_equally_likely():
-    assert log_prior(None, COARSE) == pytest.approx(-np.log(len(COARSE.taps)))
+def test_without_a_profile_every_time_of_returning_is_equally_likely_and_so_are_its_plants():
+    prior = np.exp(log_prior(None, COARSE))
+    for return_s in (0.1, 0.3, np.inf):
+        own = prior[COARSE.returns_s == return_s]
+        assert own.sum() == pytest.approx(1 / 3)
+        assert own == pytest.approx(own[0])
 
 
 @pytest.mark.parametrize("plant", range(0, COUNT, 5))
@@ -84,18 +88,18 @@ def faulty(edit):
 @pytest.mark.parametrize(
     ("edit", "sentence"),
     [
-        (lambda text: text.replace("format = 1", "format = 2"), "profile format 2, this program reads 1"),
-        (lambda text: text.replace("format = 1", ""), "profile format None"),
+        (lambda text: text.replace("format = 2", "format = 1"), "profile format 1, this program reads 2"),
+        (lambda text: text.replace("format = 2", ""), "profile format None"),
         (lambda text: text + "gain = 3\n", "unknown field 'gain'"),
-        (lambda text: re.sub(r".*delay_s = 0.15, lag_s = 0.4.*\n", "", text), "does not list the 24 plants"),
-        (lambda text: "format = 1\nplants = 3\n", "does not list the 24 plants"),
+        (lambda text: re.sub(r".*delay_s = 0.15, lag_s = 0.4.*\n", "", text), "does not list the 32 plants"),
+        (lambda text: "format = 2\nplants = 3\n", "does not list the 32 plants"),
         (lambda text: text.replace("lag_s = 0.05", "lag_s = 0.07", 1), "plant 1 is none of this program's"),
-        (lambda text: text.replace("lag_s", "lagging_s", 1), "plant 1 must have delay_s, lag_s, weight"),
+        (lambda text: text.replace("lag_s", "lagging_s", 1), "plant 1 must have delay_s, lag_s, return_s, weight"),
         (lambda text: text.replace("weight = 0.0", "weight = -0.0", 1), "weight of plant 1 is -0.0"),
         (lambda text: text.replace("weight = 0.0", "weight = 0.9", 1), "the weights add up to 1.9"),
-        (lambda text: text.replace("weight = 0.041667", "weight = nan", 1), "the weight of plant 1 is nan"),
-        (lambda text: text.replace("weight = 0.041667", "weight = 'much'", 1), "plant 1 holds something that is not"),
-        (lambda text: text.replace("weight = 0.041667", "weight = true", 1), "plant 1 holds something that is not"),
+        (lambda text: text.replace("weight = 0.031250", "weight = nan", 1), "the weight of plant 1 is nan"),
+        (lambda text: text.replace("weight = 0.031250", "weight = 'much'", 1), "plant 1 holds something that is not"),
+        (lambda text: text.replace("weight = 0.031250", "weight = true", 1), "plant 1 holds something that is not"),
         (lambda text: text[:200], "is no profile"),
         (lambda text: "\x00", "is no profile"),
     ],
