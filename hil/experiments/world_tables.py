@@ -91,7 +91,8 @@ def conditions_of(world: str, effort: Effort) -> list[Condition]:
     if effort.quick:
         shortest = min(point.message_ticks for point in points)
         points, shorter = [headline_point(world, shortest)], []
-    rollouts = dict.fromkeys(points, effort.other_rollouts)
+    # As many goals at each point, whether a rollout has several or one.
+    rollouts = {point: effort.other_rollouts * headline.goals // point.goals for point in points}
     rollouts |= dict.fromkeys(shorter, effort.compared_rollouts)
     rollouts[headline] = effort.headline_rollouts
     compared = {*shorter, headline}
