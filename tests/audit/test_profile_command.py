@@ -6,6 +6,7 @@ import pytest
 
 from hil.sensors.motion_capture import write_tum
 from mtm_audit.cli import main
+from mtm_audit.detectors.matched.plants import FINE
 from mtm_audit.detectors.matched.profile import PlantProfile, load_profile, save_profile
 from mtm_onboard.protocol import save_key
 from tests.audit.moving_robot import FAKE_SECRET, key_of, robot_track, scheme_of
@@ -82,7 +83,7 @@ def test_a_profile_that_cannot_be_used_is_refused_in_one_sentence(audit, folder,
 
 def test_a_detector_that_takes_no_profile_says_so(audit, folder, tmp_path):
     path = tmp_path / "robot.profile"
-    save_profile(PlantProfile(np.full(24, 1 / 24)), path)
+    save_profile(PlantProfile(np.full(len(FINE.taps), 1 / len(FINE.taps))), path)
     code, _, err = audit("decode", folder / "sent", "--detector", "coherency", "--profile", path)
     assert code == 1
     assert "takes no profile; leave --profile out or choose --detector matched" in err
