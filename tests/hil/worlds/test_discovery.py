@@ -128,7 +128,7 @@ def test_the_tracker_finds_the_agent_again_after_it_was_out_of_sight() -> None:
 
 
 def test_pictures_without_the_agent_are_refused() -> None:
-    with pytest.raises(MtmError, match="agent"):
+    with pytest.raises(MtmError, match="nothing of the colour #4040bf"):
         WORLD.tracker().track([Frame(0.0, np.full((704, 704, 3), 255, dtype=np.uint8))])
 
 
