@@ -2,13 +2,11 @@
 
 import math
 
-from mtm_audit.decode import CERTAIN, Decoding
+from mtm_audit.decode import CERTAIN, NEARLY, Decoding
 from mtm_audit.recordings.recording import Recording
 from mtm_onboard.protocol.framing import payload_bits
 
 _LONGEST_FACTOR = 10.0
-# A recording without a message has a p-value below this once in a hundred.
-_NEARLY = 0.01
 _MORE_DECOYS = 5
 
 
@@ -40,7 +38,7 @@ def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
 
 def _of_the_nearly_found(decoding: Decoding) -> tuple[str, ...]:
     """A tail known from few decoys is taken for heavy, so that more of them may show the same evidence to be rare."""
-    if decoding.evidence.p_value > _NEARLY:
+    if decoding.evidence.p_value > NEARLY:
         return ()
     decoys = _MORE_DECOYS * len(decoding.evidence.decoy_strengths)
     return (

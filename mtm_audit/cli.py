@@ -66,7 +66,9 @@ def decode(
     detector: Annotated[
         str, typer.Option(metavar="NAME", help="How to look for the noise: matched, or coherency as the paper does.")
     ] = "matched",
-    decoys: Annotated[int, typer.Option(min=8, help="Keys that nobody holds, to compare with.")] = 40,
+    decoys: Annotated[
+        int, typer.Option(min=8, help="Keys that nobody holds, to compare with; five times as many in doubt.")
+    ] = 40,
     threshold: Annotated[
         float, typer.Option(min=0.0, max=1.0, help="Largest p-value that still counts as a message.")
     ] = 1e-4,

@@ -301,3 +301,19 @@ def test_any_number_comes_back(number):
 def test_a_position_that_nothing_can_have_is_refused_before_it_spoils_the_sums():
     with pytest.raises(MtmError, match="beyond 1e\\+09 m"):
         Track("robot0", np.arange(3.0), np.array([[0.0, 0.0], [1e300, 0.0], [0.0, 0.0]]), np.ones(3, bool))
+
+
+@pytest.mark.parametrize(
+    ("p_value", "looks"), [(0.5, [30]), (0.011, [30]), (0.009, [30, 150]), (0.0002, [30, 150]), (0.00009, [30])]
+)
+def test_evidence_near_the_limit_is_judged_by_more_decoys_and_only_then(monkeypatch, p_value, looks):
+    found = decode_tracks(pair(), PAIR, KNOWN)
+    tried = []
+
+    def decoded(tracks, key, settings, progress):
+        tried.append(settings.decoys)
+        return replace(found, verdict="absent", evidence=replace(found.evidence, p_value=p_value), settings=settings)
+
+    monkeypatch.setattr("mtm_audit.decode._decoded", decoded)
+    assert decode_tracks(pair(), PAIR, KNOWN).settings.decoys == looks[-1]
+    assert tried == looks

@@ -3,8 +3,9 @@ import json
 import pytest
 
 from hil.cli import main
+from hil.experiments.world_points import headline_point
 from mtm_audit.cli import main as audit
-from mtm_onboard.protocol import generate_key, save_key
+from mtm_onboard.protocol import Key, generate_key, load_key, save_key
 from tests.audit.moving_robot import scheme_of
 
 
@@ -17,17 +18,29 @@ def filmed(capsys, *arguments):
 
 
 def test_a_filmed_lander_s_message_is_decoded_with_the_tracker_that_the_film_names(tmp_path, capsys):
+    key = Key("lander", b"not a real secret, only for test", headline_point("lunar-lander").scheme)
+    save_key(key, tmp_path / "lander.key")
     out = tmp_path / "lander"
-    code, said, _ = filmed(capsys, "lunar-lander", "--out", out, "--message", 6, "--seconds", 40)
+    arguments = ["--message", 6, "--seconds", 60, "--key", tmp_path / "lander.key"]
+    code, said, _ = filmed(capsys, "lunar-lander", "--out", out, *arguments)
     assert code == 0
+    assert not (out / "robot.key").exists()
     assert "decode it with --tracker brightness:0,0,600,200" in said
     with pytest.raises(SystemExit) as leaving:
-        audit(["decode", str(out / "video.mp4"), "--key", str(out / "robot.key"), "--json",
+        audit(["decode", str(out / "video.mp4"), "--key", str(tmp_path / "lander.key"), "--json",
                "--tracker", "brightness:0,0,600,200"])  # fmt: skip
     assert leaving.value.code in (0, None)
     decoded = json.loads(capsys.readouterr().out)
     assert (decoded["verdict"], decoded["message"]) == ("decoded", 6)
     assert json.loads((out / "truth.json").read_text())["message"] == 6
+
+
+def test_without_a_key_the_film_brings_its_own(tmp_path, capsys):
+    out = tmp_path / "arm"
+    code, said, _ = filmed(capsys, "reacher", "--out", out, "--no-message", "--seconds", 2)
+    assert code == 0
+    assert "no message" in said
+    assert load_key(out / "robot.key").scheme.name == "reacher"
 
 
 def test_a_key_for_something_else_is_refused_and_leaves_nothing(tmp_path, capsys):
