@@ -1,7 +1,9 @@
+import re
 import sys
 
 import pytest
 
+from hil.cli import main
 from hil.worlds.registry import NAMES, make_world
 from hil.worlds.schemes import SIGNALS
 from mtm_onboard.protocol import MtmError
@@ -25,8 +27,20 @@ def test_a_world_that_does_not_exist_is_refused_with_those_that_do():
         make_world("moon")
 
 
-def test_a_world_without_its_simulator_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    monkeypatch.delitem(sys.modules, "hil.worlds.reacher", raising=False)
-    with pytest.raises(MtmError, match=r"reacher needs mujoco, .* install it with: pip install 'mtm\[worlds\]'"):
-        make_world("reacher")
+@pytest.mark.parametrize(
+    ("world", "package"),
+    [("reacher", "mujoco"), ("lunar-lander", "Box2D"), ("discovery", "vmas"), ("football", "vmas")],
+)
+@pytest.mark.parametrize("command", [["paper"], ["film"], ["sweep"]], ids=lambda command: command[0])
+def test_a_world_without_its_simulator_says_what_to_install(monkeypatch, capsys, tmp_path, world, package, command):
+    monkeypatch.setitem(sys.modules, package, None)
+    out = ["--out", str(tmp_path / "out")]
+    options = {"paper": ["--quick", "--cells", str(tmp_path / "cells")], "film": ["--no-message", *out], "sweep": out}
+    with pytest.raises(SystemExit) as leaving:
+        main([*command, world, *options[command[0]]])
+    assert leaving.value.code == 1
+    (sentence,) = capsys.readouterr().err.splitlines()
+    assert re.search(
+        rf"world {world} needs .*{package}.* is missing; install it with: pip install 'mtm\[worlds\]'", sentence
+    )
+    assert not (tmp_path / "out").exists()
