@@ -2,12 +2,11 @@
 
 import math
 
-from mtm_audit.decode import CERTAIN, NEARLY, Decoding
+from mtm_audit.decode import CERTAIN, MORE_DECOYS, NEARLY, Decoding
 from mtm_audit.recordings.recording import Recording
 from mtm_onboard.protocol.framing import payload_bits
 
 _LONGEST_FACTOR = 10.0
-_MORE_DECOYS = 5
 
 
 def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
@@ -40,7 +39,7 @@ def _of_the_nearly_found(decoding: Decoding) -> tuple[str, ...]:
     """A tail known from few decoys is taken for heavy, so that more of them may show the same evidence to be rare."""
     if decoding.evidence.p_value > NEARLY:
         return ()
-    decoys = _MORE_DECOYS * len(decoding.evidence.decoy_strengths)
+    decoys = MORE_DECOYS * len(decoding.evidence.decoy_strengths)
     return (
         f"Chance seldom comes so near, though: do not take it for absent before more decoy keys (--decoys {decoys}) or "
         "a longer recording have said so too.",

@@ -27,7 +27,7 @@ CERTAIN = 0.95
 
 # A recording without a message has a p-value below this once in a hundred.
 NEARLY = 0.01
-_MORE_DECOYS = 5
+MORE_DECOYS = 5
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def decode_tracks(
     decoding = _decoded(tracks, key, settings, progress)
     if not settings.threshold < decoding.evidence.p_value <= NEARLY:
         return decoding
-    return _decoded(tracks, key, replace(settings, decoys=_MORE_DECOYS * settings.decoys), progress)
+    return _decoded(tracks, key, replace(settings, decoys=MORE_DECOYS * settings.decoys), progress)
 
 
 def _decoded(tracks: Sequence[Track], key: Key, settings: DecodeSettings, progress: Progress | None) -> Decoding:

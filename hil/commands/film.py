@@ -15,7 +15,7 @@ from hil.newfolder import new_folder
 from hil.sensors.video import write_video
 from hil.worlds.noise import keyed_noise
 from hil.worlds.registry import make_world
-from hil.worlds.world import Rollout, World
+from hil.worlds.world import Rollout, World, check_axes
 from mtm_audit.recordings.frames import Frame
 from mtm_audit.tracks import Floats
 from mtm_onboard.protocol import Key, MtmError, generate_key, load_key, save_key
@@ -77,9 +77,7 @@ def _rollout(world: World, key: Key, options: FilmOptions) -> Rollout:
             f"the key's scheme cannot be played in {world.name}; choose one of {world.rate_hz:g} Hz with a fixed "
             "schedule and plain numbers as messages"
         )
-    foreign = {f"{channel.body}.{axis}" for channel in scheme.channels for axis in channel.axes} - set(world.axes)
-    if foreign:
-        raise MtmError(f"{world.name} has no axis {min(foreign)!r}; its axes are: {', '.join(world.axes)}")
+    check_axes(world, scheme)
     # Each of the lander's goals would be a film of its own.
     goals = 1 if world.name == "lunar-lander" else world.goals
     ticks = max(1, round(options.seconds * world.rate_hz / goals))

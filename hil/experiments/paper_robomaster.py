@@ -1,6 +1,5 @@
 """The paper's RoboMaster table and its null conditions, measured on the simulated fleet."""
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,12 +10,12 @@ from rich.table import Table
 
 from hil.experiments import paper_figures
 from hil.experiments.cells import Cell, CellStore, Values
+from hil.experiments.commented_csv import write_commented_csv
 from hil.experiments.intervals import clopper_pearson
 from hil.experiments.paper_figures import PaperFigure
 from hil.experiments.robomaster_rollout import NO_MESSAGE, SENT, WRONG_KEY, decode_rollout, rollout_parameters
 from hil.experiments.sweep import run_sweep
 from hil.robots.mecanum import MecanumParameters
-from mtm_onboard.protocol.atomicfile import replacing
 
 # Wrong keys that try each rollout: with 40 rollouts of four robots as many decodes as in the paper.
 DECOYS = 10
@@ -39,6 +38,10 @@ class Proportion:
         """Exact 95 % interval, which takes the trials for independent."""
         low, high = clopper_pearson(self.successes, self.trials)
         return 100.0 * low, 100.0 * high
+
+    def __str__(self) -> str:
+        low, high = self.interval_percent
+        return f"{self.percent:.1f} [{low:.0f}-{high:.0f}]"
 
 
 @dataclass(frozen=True)
@@ -107,8 +110,8 @@ def rich_table(rows: Sequence[Row]) -> Table:
         table.add_column(name, justify="left" if name == "sent" else "right", no_wrap=True)
     for row in rows:
         table.add_row(
-            row.arm, str(row.message_ticks), _with_interval(row.symbols),
-            f"{row.paper.symbol_percent:g}", "" if row.messages is None else _with_interval(row.messages),
+            row.arm, str(row.message_ticks), str(row.symbols),
+            f"{row.paper.symbol_percent:g}", "" if row.messages is None else str(row.messages),
             _or_nothing(row.paper.message_percent), f"{row.margin:.3f}±{row.margin_error:.3f}",
             _or_nothing(row.paper.margin),
         )  # fmt: skip
@@ -117,16 +120,11 @@ def rich_table(rows: Sequence[Row]) -> Table:
 
 def write_csv(path: Path, rows: Sequence[Row], comments: Sequence[str]) -> None:
     """Write the rows after the comments, of which the first is the command line."""
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(f"# {comment}\n" for comment in comments)
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(
-            ("arm", "message_ticks", "rollouts", "symbols", "symbols_correct", "symbol_percent", "symbol_percent_low",
+    columns = ("arm", "message_ticks", "rollouts", "symbols", "symbols_correct", "symbol_percent", "symbol_percent_low",
              "symbol_percent_high", "paper_symbol_percent", "messages_correct", "message_percent",
              "message_percent_low", "message_percent_high", "paper_message_percent", "margin",
-             "margin_standard_error", "paper_margin")
-        )  # fmt: skip
-        writer.writerows(_csv_cells(row) for row in rows)
+             "margin_standard_error", "paper_margin")  # fmt: skip
+    write_commented_csv(path, comments, columns, (_csv_cells(row) for row in rows))
 
 
 def _csv_cells(row: Row) -> tuple[object, ...]:
@@ -142,11 +140,6 @@ def _csv_cells(row: Row) -> tuple[object, ...]:
         *messages, _or_nothing(row.paper.message_percent), f"{row.margin:.4f}", f"{row.margin_error:.4f}",
         _or_nothing(row.paper.margin),
     )  # fmt: skip
-
-
-def _with_interval(proportion: Proportion) -> str:
-    low, high = proportion.interval_percent
-    return f"{proportion.percent:.1f} [{low:.0f}-{high:.0f}]"
 
 
 def _or_nothing(value: float | None) -> str:

@@ -12,7 +12,7 @@ from hil.experiments.world_rollout import watch
 from hil.worlds.noise import keyed_noise
 from hil.worlds.registry import make_world
 from hil.worlds.schemes import SIGNALS, split_scheme
-from hil.worlds.world import Integers, World
+from hil.worlds.world import Integers, World, check_axes
 from mtm_onboard.protocol import Codebook, MtmError, Scheme
 from mtm_onboard.protocol.framing import channel_symbols
 from mtm_onboard.protocol.scheme import scheme_from_table
@@ -34,11 +34,7 @@ def world_parameters(world: str, scheme: Scheme, detector: str) -> dict[str, Sca
     if detector not in DETECTORS:
         raise MtmError(f"there is no detector {detector!r} to measure with; choose one of: {', '.join(DETECTORS)}")
     made = make_world(world)
-    known = set(made.axes)
-    for channel in scheme.channels:
-        foreign = [f"{channel.body}.{axis}" for axis in channel.axes if f"{channel.body}.{axis}" not in known]
-        if foreign:
-            raise MtmError(f"{world} has no axis {foreign[0]!r}; its axes are: {', '.join(made.axes)}")
+    check_axes(made, scheme)
     if scheme.rate_hz != made.rate_hz:
         raise MtmError(f"{world} runs at {made.rate_hz:g} Hz, the scheme at {scheme.rate_hz:g}; make them equal")
     return {"simulator": world, "scheme": scheme_text(scheme), "detector": detector}

@@ -1,6 +1,5 @@
 """What the noise costs the task: the paper's measures, and what it did not measure, of driven rollouts."""
 
-import csv
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hil.experiments.cells import Cell, CellStore, Scalar, Values
+from hil.experiments.commented_csv import write_commented_csv
 from hil.experiments.sweep import run_sweep
 from hil.experiments.world_points import SAME, headline_point
 from hil.worlds.noise import keyed_noise, white_noise
@@ -18,7 +18,6 @@ from hil.worlds.registry import make_world
 from hil.worlds.world import Conduct
 from mtm_audit.tracks import Floats
 from mtm_onboard.protocol import Codebook
-from mtm_onboard.protocol.atomicfile import replacing
 
 CLEAN, WHITE, KEYED = "clean", "white noise", "watermarked"
 # The paper's table "Clean controller vs. equal-amplitude WGN vs. watermarked": mean and spread.
@@ -150,11 +149,9 @@ def _cell(row: Measure | None) -> str:
 
 def write_csv(path: Path, rows: Sequence[Measure], comments: Sequence[str]) -> None:
     """Write the rows after the comments, of which the first is the command line."""
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(f"# {comment}\n" for comment in comments)
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("world", "measure", "condition", "rollouts", "mean", "standard_deviation", "paper"))
-        writer.writerows(
-            (row.world, row.name, row.condition, row.rollouts, f"{row.mean:.5g}", f"{row.deviation:.4g}", row.paper)
-            for row in rows
-        )
+    columns = ("world", "measure", "condition", "rollouts", "mean", "standard_deviation", "paper")
+    cells = [
+        (row.world, row.name, row.condition, row.rollouts, f"{row.mean:.5g}", f"{row.deviation:.4g}", row.paper)
+        for row in rows
+    ]
+    write_commented_csv(path, comments, columns, cells)

@@ -1,6 +1,5 @@
 """The worlds' tables for a terminal and for a file, ours beside the paper's."""
 
-import csv
 import math
 import tomllib
 from collections.abc import Sequence
@@ -8,13 +7,13 @@ from pathlib import Path
 
 from rich.table import Table
 
+from hil.experiments.commented_csv import write_commented_csv
 from hil.experiments.intervals import clopper_pearson
 from hil.experiments.paper_robomaster import Proportion
 from hil.experiments.world_points import PaperCell, headline_point
 from hil.experiments.world_reading import COHERENCY
 from hil.experiments.world_rollout import NO_MESSAGE, SENT
 from hil.experiments.world_tables import THROUGH_A_FILE, WRONG_KEY, Row, shortest_ticks
-from mtm_onboard.protocol.atomicfile import replacing
 
 _COLUMNS = (
     "arm", "arrangement", "alphabet_size", "message_ticks", "symbols_per_channel", "detector", "rollouts", "messages",
@@ -71,7 +70,7 @@ def rich_table(world: str, rows: Sequence[Row]) -> Table:
     for group in groups.values():
         first = group[0]
         counted = first.goals or first.symbols
-        values = {row.detector: _with_interval(row.goals or row.symbols) + _arrow(row) for row in group}
+        values = {row.detector: str(row.goals or row.symbols) + _arrow(row) for row in group}
         table.add_row(
             _SHORT[first.arm], first.point.arrangement, str(first.point.alphabet_size), str(first.point.message_ticks),
             str(counted.trials), "" if first.paper is None else f"{first.paper.percent:g}",
@@ -104,15 +103,13 @@ def shortest_messages(rows: Sequence[Row]) -> str:
 
 def write_null_csv(path: Path, tables: Sequence[tuple[str, Sequence[Row]]], comments: Sequence[str]) -> None:
     """Write the null conditions of all worlds, with whether each interval covers chance, 1 / M."""
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(f"# {comment}\n" for comment in comments)
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(
-            ("world", "arm", "arrangement", "alphabet_size", "message_ticks", "detector", "symbols", "symbols_correct",
-             "symbol_percent", "symbol_percent_low", "symbol_percent_high", "chance_percent", "covers_chance",
-             "paper_symbol_percent")
-        )  # fmt: skip
-        writer.writerows(_null_cells(world, row) for world, rows in tables for row in rows if row.goals is None)
+    columns = (
+        "world", "arm", "arrangement", "alphabet_size", "message_ticks", "detector", "symbols", "symbols_correct",
+        "symbol_percent", "symbol_percent_low", "symbol_percent_high", "chance_percent", "covers_chance",
+        "paper_symbol_percent",
+    )  # fmt: skip
+    cells = [_null_cells(world, row) for world, rows in tables for row in rows if row.goals is None]
+    write_commented_csv(path, comments, columns, cells)
 
 
 def _null_cells(world: str, row: Row) -> tuple[object, ...]:
@@ -127,11 +124,7 @@ def _null_cells(world: str, row: Row) -> tuple[object, ...]:
 
 def write_csv(path: Path, rows: Sequence[Row], comments: Sequence[str]) -> None:
     """Write the rows after the comments, of which the first is the command line."""
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(f"# {comment}\n" for comment in comments)
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(_COLUMNS)
-        writer.writerows(_cells(row) for row in rows)
+    write_commented_csv(path, comments, _COLUMNS, (_cells(row) for row in rows))
 
 
 def _cells(row: Row) -> tuple[object, ...]:
@@ -147,11 +140,6 @@ def _cells(row: Row) -> tuple[object, ...]:
 def _proportion(proportion: Proportion) -> tuple[object, ...]:
     low, high = proportion.interval_percent
     return (proportion.trials, proportion.successes, *(f"{value:.2f}" for value in (proportion.percent, low, high)))
-
-
-def _with_interval(proportion: Proportion) -> str:
-    low, high = proportion.interval_percent
-    return f"{proportion.percent:.1f} [{low:.0f}-{high:.0f}]"
 
 
 def _or_nothing(value: float) -> str:

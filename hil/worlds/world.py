@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mtm_audit.recordings.frames import Frame
 from mtm_audit.tracking.registry import Tracker
 from mtm_audit.tracks import Floats
+from mtm_onboard.protocol import MtmError, Scheme
 
 Integers = NDArray[np.int64]
 
@@ -88,3 +89,11 @@ class World(Protocol):
     def tracker(self) -> Tracker:
         """The paper's tracker for this world's pictures."""
         ...
+
+
+def check_axes(world: World, scheme: Scheme) -> None:
+    """Raise MtmError when the scheme has an axis that the world has not."""
+    used = [f"{channel.body}.{axis}" for channel in scheme.channels for axis in channel.axes]
+    foreign = [axis for axis in used if axis not in world.axes]
+    if foreign:
+        raise MtmError(f"{world.name} has no axis {foreign[0]!r}; its axes are: {', '.join(world.axes)}")
