@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mtm_onboard.message import message_of
-from mtm_onboard.modulator import Modulator
 from mtm_onboard.policies import ActionBounds, KeyedGaussian, KeyedNoise
 from mtm_onboard.protocol import Channel, Key, MtmError, Scheme, generate_key, save_key
+from mtm_onboard.runtime.message import message_of
+from mtm_onboard.runtime.modulator import Modulator
 
 RATE_HZ = 50.0
 POLICY_STD_MPS = 0.15

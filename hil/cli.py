@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from hil.clioptions import CELLS_HELP, Renderer, reported_console
-from hil.papercli import paper
+from hil.commands.options import CELLS_HELP, Renderer, reported_console
+from hil.commands.paper_cli import paper
 
 app = typer.Typer(
     help="Robots that send messages through motion, simulated with the real onboard software in the loop.",
@@ -26,7 +26,7 @@ class WireName(StrEnum):
 
 
 class CameraName(StrEnum):
-    """Keys of `hil.cameras.CAMERAS`, repeated so that --help need not load OpenCV."""
+    """Keys of `hil.sensors.cameras.CAMERAS`, repeated so that --help need not load OpenCV."""
 
     OVERHEAD = "overhead"
     TILTED = "tilted"

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from mtm_audit.clierrors import reported
+from mtm_audit.commands.errors import reported
 
 app = typer.Typer(
     help="Find out what a robot said with its motion: from a recording and a key to a verdict.",
@@ -95,9 +95,9 @@ def decode(
     onset_s, pairs, at_unix_s = _onset_s(onset), _pairs(assign or []), _unix_s(at)
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.decode import DecodeOptions, run_decode
-        from mtm_audit.decode import DecodeSettings
+        from mtm_audit.decoding.decode import DecodeSettings
         from mtm_audit.detectors.matched.profile import load_profile
-        from mtm_audit.when import RecordedAt
+        from mtm_audit.model.recorded_at import RecordedAt
 
         known = None if profile is None else load_profile(profile)
         recorded = None if at_unix_s is None else RecordedAt(at_unix_s, at_error)
@@ -128,7 +128,7 @@ def learn_profile(
     onset_s, pairs = _onset_s(onset), _pairs(assign or [])
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.profile import ProfileOptions, run_profile
-        from mtm_audit.decode import DecodeSettings
+        from mtm_audit.decoding.decode import DecodeSettings
 
         settings = DecodeSettings("matched", onset_s, assignment=pairs)
         run_profile(ProfileOptions(tuple(paths), key, out, tracker, settings))

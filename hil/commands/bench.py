@@ -5,15 +5,15 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.bench import PAPER_SIGMA, conditions, measure, quick_conditions
-from hil.experiments.bench_report import draw_plot, rich_table, write_csv
-from hil.experiments.bench_rollout import silent_motions
-from hil.experiments.bench_summary import summary
-from hil.experiments.capacity import capacity_bps
-from hil.experiments.cells import CellStore
-from hil.robots.mecanum import MecanumParameters, calibrated_parameters
+from hil.experiments.detectors.bench import PAPER_SIGMA, conditions, measure, quick_conditions
+from hil.experiments.detectors.bench_report import draw_plot, rich_table, write_csv
+from hil.experiments.detectors.bench_rollout import silent_motions
+from hil.experiments.detectors.bench_summary import summary
+from hil.experiments.detectors.capacity import capacity_bps
+from hil.experiments.runs.cells import CellStore
+from hil.plants.mecanum import MecanumParameters, calibrated_parameters
 from hil.worlds.robomaster import fleet_scheme
-from mtm_audit.plot import check_plot_path
+from mtm_audit.reporting.plot import check_plot_path
 
 _SILENT_S = 17.5
 _SILENCES, _QUICK_SILENCES = 30, 3

@@ -5,10 +5,10 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from hil.experiments.calibrate import SLIPS_MPS, Candidate, best_candidate, scan, write_plant
-from hil.experiments.cells import CellStore
-from hil.experiments.paper_figures import MARGINS
-from hil.robots.mecanum import PLANT_FILE, calibrated_parameters
+from hil.experiments.detectors.calibrate import SLIPS_MPS, Candidate, best_candidate, scan, write_plant
+from hil.experiments.detectors.paper_figures import MARGINS
+from hil.experiments.runs.cells import CellStore
+from hil.plants.mecanum import PLANT_FILE, calibrated_parameters
 
 
 def calibrate(rollouts: int, out: Path | None, cells: Path, console: Console) -> None:

@@ -12,8 +12,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from hil.newfolder import new_folder
-from hil.programs import SINGLE_THREADED, program
+from hil.commands.new_folder import new_folder
+from hil.fleet.programs import SINGLE_THREADED, program
 from mtm_onboard.protocol import MtmError
 
 MESSAGE = 0b10110010

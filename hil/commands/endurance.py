@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.endurance import SYMBOLS, Checkpoint, endure
+from hil.experiments.hardening.endurance import SYMBOLS, Checkpoint, endure
 from mtm_onboard.protocol.atomicfile import replacing
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from hil.experiments.cells import CellStore
-from hil.experiments.false_alarms import NO_MESSAGE, WRONG_KEY, decode_nothing, false_alarm_cells, summarise
-from hil.experiments.intervals import clopper_pearson
-from hil.experiments.sweep import run_sweep
+from hil.experiments.detectors.false_alarms import NO_MESSAGE, WRONG_KEY, decode_nothing, false_alarm_cells, summarise
+from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.sweep import run_sweep
 from mtm_onboard.protocol.atomicfile import replacing
 
 _LEVELS = (0.5, 0.1, 0.05, 0.01, 0.001, 0.0001)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.cells import CellStore
-from hil.experiments.faults import Line, Outcome, fault_cell, fault_cells, line_of
-from hil.experiments.sweep import run_sweep
+from hil.experiments.hardening.faults import Line, Outcome, fault_cell, fault_cells, line_of
+from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.sweep import run_sweep
 from mtm_onboard.protocol.atomicfile import replacing
 
 _NO_LOSS = "no"

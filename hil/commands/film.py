@@ -9,15 +9,15 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from hil.experiments.world_points import SAME, headline_point
-from hil.experiments.world_rollout import NATIVE
-from hil.newfolder import new_folder
+from hil.commands.new_folder import new_folder
+from hil.experiments.worlds.points import SAME, headline_point
+from hil.experiments.worlds.rollout import NATIVE
 from hil.sensors.video import write_video
 from hil.worlds.noise import keyed_noise
 from hil.worlds.registry import make_world
 from hil.worlds.world import Rollout, World, check_axes
-from mtm_audit.recordings.frames import Frame
-from mtm_audit.tracks import Floats
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Floats
 from mtm_onboard.protocol import Key, MtmError, generate_key, load_key, save_key
 from mtm_onboard.protocol.framing import symbols_of_number
 

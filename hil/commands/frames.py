@@ -5,10 +5,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.cells import CellStore
-from hil.experiments.frames import Line, frame_cells, line_of, read_frames
-from hil.experiments.intervals import clopper_pearson
-from hil.experiments.sweep import run_sweep
+from hil.experiments.messages.frames import Line, frame_cells, line_of, read_frames
+from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.sweep import run_sweep
 from mtm_onboard.protocol.atomicfile import replacing
 
 _COLUMNS = (

@@ -5,10 +5,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.cells import CellStore
-from hil.experiments.fuzz import COUNTS, Summary, fuzz_cell, fuzz_cells, summarise
-from hil.experiments.fuzz_targets import TARGETS
-from hil.experiments.sweep import run_sweep
+from hil.experiments.hardening.fuzz import COUNTS, Summary, fuzz_cell, fuzz_cells, summarise
+from hil.experiments.hardening.fuzz_targets import TARGETS
+from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.sweep import run_sweep
 from mtm_onboard.protocol.atomicfile import replacing
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.cells import Cell, CellStore
-from hil.experiments.intervals import clopper_pearson
-from hil.experiments.messages import JOBS, payload_bps, receive
-from hil.experiments.sweep import run_sweep
+from hil.experiments.messages.jobs import JOBS, payload_bps, receive
+from hil.experiments.runs.cells import Cell, CellStore
+from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.sweep import run_sweep
 from mtm_onboard.protocol.atomicfile import replacing
 
 _COLUMNS = ("job", "payload_bps", "rollouts", "received", "share", "low", "high", "wrong")

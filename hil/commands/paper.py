@@ -6,12 +6,13 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments import world_conduct, world_report
-from hil.experiments.cells import CellStore
-from hil.experiments.paper_robomaster import measure, rich_table, write_csv
-from hil.experiments.world_tables import Condition, Effort, Row, conditions_of, null_conditions_of
-from hil.experiments.world_tables import measure as measure_world
-from hil.robots.mecanum import calibrated_parameters
+from hil.experiments.detectors.paper_robomaster import measure, rich_table, write_csv
+from hil.experiments.runs.cells import CellStore
+from hil.experiments.worlds import conduct as world_conduct
+from hil.experiments.worlds import report as world_report
+from hil.experiments.worlds.tables import Condition, Effort, Row, conditions_of, null_conditions_of
+from hil.experiments.worlds.tables import measure as measure_world
+from hil.plants.mecanum import calibrated_parameters
 from hil.worlds.registry import NAMES, make_world
 from mtm_onboard.protocol import MtmError
 

@@ -9,12 +9,12 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from hil.cameras import CAMERAS
-from hil.lockstep import run_lockstep
-from hil.newfolder import new_folder
-from hil.realtime import START_S, run_realtime
-from hil.recording import Sensors, write_recording
-from hil.rig import RobotReport, RunSettings, Wire
+from hil.commands.new_folder import new_folder
+from hil.fleet.lockstep import run_lockstep
+from hil.fleet.realtime import START_S, run_realtime
+from hil.fleet.recording import Sensors, write_recording
+from hil.fleet.rig import RobotReport, RunSettings, Wire
+from hil.sensors.cameras import CAMERAS
 from hil.worlds.robomaster import fleet_scheme
 from mtm_onboard.protocol import generate_key, load_key, save_key
 from mtm_onboard.protocol.framing import symbols_of_number

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.cells import Cell, CellStore
-from hil.experiments.intervals import clopper_pearson
-from hil.experiments.robustness import CONDITIONS, JOBS, read_under
-from hil.experiments.sweep import run_sweep
+from hil.experiments.detectors.robustness import CONDITIONS, JOBS, read_under
+from hil.experiments.runs.cells import Cell, CellStore
+from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.sweep import run_sweep
 from mtm_onboard.protocol.atomicfile import replacing
 
 

@@ -4,11 +4,11 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.cells import CellStore
-from hil.experiments.paper_robomaster import Proportion
-from hil.experiments.shim import JOB, compare, write_csv
-from hil.robots.mecanum import calibrated_parameters
-from hil.robots.shim_library import load_shim
+from hil.experiments.detectors.paper_robomaster import Proportion
+from hil.experiments.hardening.shim import JOB, compare, write_csv
+from hil.experiments.runs.cells import CellStore
+from hil.plants.mecanum import calibrated_parameters
+from hil.vehicles.shim_library import load_shim
 
 
 def shim(rollouts: int, out: Path | None, cells: Path, console: Console) -> None:

@@ -11,7 +11,7 @@ from hil.sensors import textures
 from hil.sensors.optics import Optics, overhead
 from hil.sensors.poses import Floats, Occlusion, Trajectory, common_span_s, occluded
 from hil.sensors.scene import Painter, Scene, Sighting
-from mtm_audit.recordings.frames import Frame, Image
+from mtm_audit.model.picture import Frame, Image
 from mtm_onboard.protocol.errors import MtmError
 
 NOISE_SLACK_PX = 64

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from hil.sensors.poses import Occlusion, Trajectory, common_span_s, occluded
-from mtm_audit.tracks import Track
+from mtm_audit.model.track import Track
 from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hil.sensors import textures
 from hil.sensors.optics import Optics
 from hil.sensors.poses import Floats
-from mtm_audit.recordings.frames import Image
+from mtm_audit.model.picture import Image
 
 SUPERSAMPLING = 3
 CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_audit.recordings.frames import Image
+from mtm_audit.model.picture import Image
 
 TEXELS_PER_M = 600  # a multiple that gives each module of a marker a whole number of texels
 ROBOT_LENGTH_M, ROBOT_WIDTH_M, ROBOT_HEIGHT_M = 0.32, 0.24, 0.20

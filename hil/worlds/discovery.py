@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from hil.worlds.discovery_pictures import AGENT_COLOUR, PICTURE_PX, draw, draw_natively
 from hil.worlds.world import Conduct, Integers, Rollout, Shot
-from mtm_audit.recordings.frames import Frame
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Floats
 from mtm_audit.tracking.registry import Tracker
-from mtm_audit.tracks import Floats
 from mtm_onboard.protocol import MtmError
 
 if TYPE_CHECKING:

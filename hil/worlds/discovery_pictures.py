@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 
 from hil.worlds.vmas_pictures import native_image, scale_px, to_pixels
-from mtm_audit.recordings.frames import Image
-from mtm_audit.tracks import Floats
+from mtm_audit.model.picture import Image
+from mtm_audit.model.track import Floats
 
 if TYPE_CHECKING:
     from vmas.simulator.environment import Environment

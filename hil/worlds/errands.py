@@ -9,7 +9,7 @@ import numpy as np
 from scipy import signal
 
 from hil.worlds.robomaster import Route, Task, TaskFactory, go_to_goal, heading_held
-from mtm_onboard.motion import BodyVelocity
+from mtm_onboard.model.velocity import BodyVelocity
 
 _STREAM = 11
 _RATE_HZ = 50.0

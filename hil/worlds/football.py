@@ -13,9 +13,9 @@ import numpy as np
 from hil.worlds.football_pictures import PICTURE_PX, draw, draw_natively
 from hil.worlds.football_team import GOAL_XY_M, STRATEGIES, Sight, Team, strategies
 from hil.worlds.world import Conduct, Integers, Rollout, Shot
-from mtm_audit.recordings.frames import Frame
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Floats
 from mtm_audit.tracking.registry import Tracker
-from mtm_audit.tracks import Floats
 from mtm_onboard.protocol import MtmError
 
 if TYPE_CHECKING:

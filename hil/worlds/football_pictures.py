@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 
 from hil.worlds.vmas_pictures import native_image, scale_px, to_pixels
-from mtm_audit.recordings.frames import Image
-from mtm_audit.tracks import Bools, Floats
+from mtm_audit.model.picture import Image
+from mtm_audit.model.track import Bools, Floats
 
 if TYPE_CHECKING:
     from vmas.simulator.environment import Environment

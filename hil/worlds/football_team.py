@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.worlds.world import Integers
-from mtm_audit.tracks import Floats
+from mtm_audit.model.track import Floats
 
 # How fast the team goes; VMAS lets nobody go faster than 0.15 m/s.
 TEMPOS_MPS = (0.12, 0.13, 0.14, 0.15)

@@ -13,9 +13,9 @@ from Box2D import b2Body as Body
 from gymnasium.envs.box2d import lunar_lander
 
 from hil.worlds.world import Conduct, Integers, Rollout, Shot
-from mtm_audit.recordings.frames import Frame
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Floats
 from mtm_audit.tracking.registry import Tracker
-from mtm_audit.tracks import Floats
 
 PADS_X_M = np.linspace(4.5, 15.5, 8)
 # High enough that neither terrain (up to 6.6 m) nor flags share the upper rows of the picture with the lander.

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from hil.worlds.lander import BODIES, FADING_PER_PICTURE, TERRAIN_POINTS
 from hil.worlds.world import Shot
-from mtm_audit.recordings.frames import Frame, Image
-from mtm_audit.tracks import Floats
+from mtm_audit.model.picture import Frame, Image
+from mtm_audit.model.track import Floats
 from mtm_onboard.protocol import MtmError
 
 WIDTH_PX, HEIGHT_PX = lunar_lander.VIEWPORT_W, lunar_lander.VIEWPORT_H

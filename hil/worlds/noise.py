@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mtm_audit.tracks import Floats
-from mtm_onboard.modulator import Modulator
+from mtm_audit.model.track import Floats
 from mtm_onboard.protocol import Codebook, Scheme
 from mtm_onboard.protocol.framing import channel_symbols
+from mtm_onboard.runtime.modulator import Modulator
 
 
 def axis_columns(scheme: Scheme, axes: Sequence[str]) -> dict[str, list[int]]:

@@ -16,9 +16,9 @@ import numpy as np
 from hil.worlds.reacher_pictures import drawn_pictures, rendered_pictures
 from hil.worlds.reacher_policy import trained_policy
 from hil.worlds.world import Conduct, Integers, Rollout, Shot
-from mtm_audit.recordings.frames import Frame
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Floats
 from mtm_audit.tracking.registry import Tracker
-from mtm_audit.tracks import Floats
 
 TARGET_RING_M = 0.14
 TARGET_REACH_M = 0.20

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.worlds.world import Shot
-from mtm_audit.recordings.frames import Frame, Image
+from mtm_audit.model.picture import Frame, Image
+from mtm_audit.model.track import Floats
 from mtm_audit.tracking.arms import INNER_RGB, OUTER_RGB
-from mtm_audit.tracks import Floats
 from mtm_onboard.protocol.errors import MtmError
 
 PICTURE_PX = 480

@@ -6,7 +6,7 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_audit.tracks import Floats
+from mtm_audit.model.track import Floats
 
 # Bounds that Stable-Baselines3 keeps the logarithm of the standard deviation in.
 LOG_STD_BOUNDS = (-20.0, 2.0)

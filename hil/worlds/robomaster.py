@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from mtm_onboard.motion import BodyVelocity
+from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import Channel, Scheme
 
 ROBOTS = 4

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mtm_audit.recordings.frames import Image
-from mtm_audit.tracks import Floats
+from mtm_audit.model.picture import Image
+from mtm_audit.model.track import Floats
 from mtm_onboard.protocol import MtmError
 
 if TYPE_CHECKING:

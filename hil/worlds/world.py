@@ -7,9 +7,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_audit.recordings.frames import Frame
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Floats
 from mtm_audit.tracking.registry import Tracker
-from mtm_audit.tracks import Floats
 from mtm_onboard.protocol import MtmError, Scheme
 
 Integers = NDArray[np.int64]

@@ -7,14 +7,15 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from mtm_audit.decode import DecodeSettings, Decoding, decode_tracks
+from mtm_audit.decoding.decode import DecodeSettings, Decoding, decode_tracks
 from mtm_audit.detectors import make_detector
-from mtm_audit.explain import Stage, failed_stage, stages_of_decoding, stages_of_recording, text_of_stages
-from mtm_audit.jsonreport import json_report
-from mtm_audit.recordings.recording import Recording, read_recording, recording_files
-from mtm_audit.recordings.video import inspect_video
-from mtm_audit.remarks import remarks
-from mtm_audit.report import print_report
+from mtm_audit.ingest.recording import read_recording, recording_files
+from mtm_audit.model.recording import Recording
+from mtm_audit.readers.video import inspect_video
+from mtm_audit.reporting.json_report import json_report
+from mtm_audit.reporting.remarks import remarks
+from mtm_audit.reporting.stages import Stage, failed_stage, stages_of_decoding, stages_of_recording, text_of_stages
+from mtm_audit.reporting.text import print_report
 from mtm_audit.tracking.registry import tracker
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key, load_key
@@ -60,7 +61,7 @@ def _check(options: DecodeOptions) -> None:
     make_detector(options.settings.detector, options.settings.profile)
     tracker(options.tracker)
     if options.plot is not None:
-        from mtm_audit.plot import check_plot_path
+        from mtm_audit.reporting.plot import check_plot_path
 
         check_plot_path(options.plot)
 
@@ -104,7 +105,7 @@ def _read(recording: Recording, key: Key, settings: DecodeSettings, progress: Pr
 def _publish(options: DecodeOptions, recording: Recording, decoding: Decoding) -> None:
     warnings = remarks(recording, decoding)
     if options.plot is not None:
-        from mtm_audit.plot import draw_plot
+        from mtm_audit.reporting.plot import draw_plot
 
         draw_plot(recording, decoding, options.plot)
     if options.as_json:

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from mtm_audit.journal import AXES, JournalSummary, summary_of
+from mtm_audit.reporting.journal_summary import AXES, JournalSummary, summary_of
 from mtm_onboard.protocol.journal_file import JournalHeader, read_journal
 
 _PIPE_COLUMNS = 140
@@ -17,13 +17,13 @@ _PIPE_COLUMNS = 140
 def run_journal(path: Path, *, as_json: bool, plot: Path | None) -> None:
     """Read, draw, print. Raises MtmError when there is no journal, no tick in it, or no picture can be written."""
     if plot is not None:
-        from mtm_audit.plot import check_plot_path
+        from mtm_audit.reporting.plot import check_plot_path
 
         check_plot_path(plot)
     record = read_journal(path)
     summary = summary_of(record)
     if plot is not None:
-        from mtm_audit.journalplot import draw_journal
+        from mtm_audit.reporting.journal_plot import draw_journal
 
         draw_journal(record, plot)
     if as_json:

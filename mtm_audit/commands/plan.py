@@ -12,7 +12,7 @@ from mtm_audit.planning.provision import scheme_of_plan
 from mtm_audit.planning.report import check_lines, corrections, fastest, headline, remarks, rich_table
 from mtm_audit.planning.search import Found, search
 from mtm_audit.planning.table import read_table
-from mtm_audit.plot import check_plot_path
+from mtm_audit.reporting.plot import check_plot_path
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import load_key
 from mtm_onboard.protocol.scheme import Scheme

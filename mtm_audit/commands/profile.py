@@ -4,11 +4,11 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from mtm_audit.decode import DecodeSettings, Decoding, decode_tracks
+from mtm_audit.decoding.decode import DecodeSettings, Decoding, decode_tracks
 from mtm_audit.detectors.base import Observation
 from mtm_audit.detectors.matched.learn import learn_profile
 from mtm_audit.detectors.matched.profile import PlantProfile, save_profile
-from mtm_audit.recordings.recording import read_recording, recording_files
+from mtm_audit.ingest.recording import read_recording, recording_files
 from mtm_audit.tracking.registry import tracker
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key, load_key

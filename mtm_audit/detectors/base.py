@@ -7,10 +7,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_audit.glimpse import Glimpse
-from mtm_audit.timing import Onset, Timing
-from mtm_audit.tracks import Floats
-from mtm_audit.verdict import Evidence
+from mtm_audit.model.glimpse import Glimpse
+from mtm_audit.model.timing import Onset, Timing
+from mtm_audit.model.track import Floats
+from mtm_audit.significance.decoys import Evidence
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from scipy.special import softmax
 
 from mtm_audit.detectors.base import ChannelReading, Observation, Reading, combine_repeats, whole_windows
+from mtm_audit.detectors.gcc_phat import RATE_SCALES, find_onset, find_onset_within, plan_onset_search
 from mtm_audit.detectors.welch import Complexes, mean_coherency, segment_spectra
-from mtm_audit.glimpse import Glimpse, tick_velocities_at_rates
-from mtm_audit.timing import RATE_SCALES, Onset, OnsetRange, Timing, find_onset, find_onset_within, plan_onset_search
-from mtm_audit.tracks import Floats
-from mtm_audit.verdict import Evidence, weigh
+from mtm_audit.model.glimpse import Glimpse, tick_velocities_at_rates
+from mtm_audit.model.timing import Onset, OnsetRange, Timing
+from mtm_audit.model.track import Floats
+from mtm_audit.significance.decoys import Evidence, weigh
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from mtm_audit.model.track import Floats
 from mtm_audit.planning.curve import Integers
-from mtm_audit.tracks import Floats
 
 
 def best_log_accuracies(logs: Sequence[Floats], symbols: int, message_ticks: Integers) -> Floats:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mtm_audit.model.track import Floats
 from mtm_audit.planning.capacity import capacity_shares
 from mtm_audit.planning.curve import Curve, Integers
 from mtm_audit.planning.family import Strategy, in_use, split_lengths
-from mtm_audit.tracks import Floats
 
 # Message lengths that are tried: many allocations divide them into whole windows.
 _ROUND_TICKS = 60

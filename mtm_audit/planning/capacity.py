@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.special import xlogy
 
-from mtm_audit.tracks import Floats
+from mtm_audit.model.track import Floats
 
 
 def capacity_bits(accuracy: float | Floats, alphabet_size: int) -> Floats:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 
+from mtm_audit.model.track import Floats
 from mtm_audit.planning.table import AccuracyPoint
-from mtm_audit.tracks import Floats
 
 Integers = NDArray[np.int64]
 

@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from mtm_audit.model.track import Floats
 from mtm_audit.planning.family import Family, Strategy
 from mtm_audit.planning.plan import Problem
 from mtm_audit.planning.search import Found, families, frontier
 from mtm_audit.planning.table import AccuracyTable
-from mtm_audit.plot import check_plot_path
-from mtm_audit.tracks import Floats
+from mtm_audit.reporting.plot import check_plot_path
 from mtm_onboard.protocol.atomicfile import replacing
 
 _COLOURS: dict[Strategy, str] = {"single": "#b42318", "same": "#3366cc", "split": "#1e7a3a"}

@@ -9,9 +9,9 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from mtm_audit.model.track import Floats
 from mtm_audit.planning.allocation import best_allocation, best_log_accuracies
 from mtm_audit.planning.curve import Curve, Integers
-from mtm_audit.tracks import Floats
 
 Strategy = Literal["single", "same", "split"]
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import beta
 
+from mtm_audit.model.track import Floats
 from mtm_audit.planning.curve import Curve, error_between
-from mtm_audit.tracks import Floats
 
 CONFIDENCE = 0.95
 _DRAWS = 2048

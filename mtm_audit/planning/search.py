@@ -7,12 +7,12 @@ from typing import get_args
 
 import numpy as np
 
+from mtm_audit.model.track import Floats
 from mtm_audit.planning.bycapacity import SplitByCapacity
 from mtm_audit.planning.curve import Curve, Integers, fit_curve
 from mtm_audit.planning.family import Family, Split, Strategy, Uniform
 from mtm_audit.planning.plan import Plan, Problem, fastest_of, symbols_needed
 from mtm_audit.planning.table import AccuracyTable
-from mtm_audit.tracks import Floats
 from mtm_onboard.protocol.errors import MtmError
 
 # Symbols up to which every allocation is searched; longer messages are split by capacity.

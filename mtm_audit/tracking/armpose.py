@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mtm_audit.model.track import Bools, Floats, Track
 from mtm_audit.tracking.kalman import kalman_smoothed
-from mtm_audit.tracks import Bools, Floats, Track
 
 # A station counts when its width is within this of the link's: elsewhere something lies over a side of the link, or
 # the link ends, and the middle of what shows is not the link's.

@@ -5,12 +5,12 @@ from typing import Literal
 
 import numpy as np
 
-from mtm_audit.recordings.frames import Frame
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Floats, Track
 from mtm_audit.tracking.armpose import Stations, joint_angles
 from mtm_audit.tracking.cover import cover_of, split_colours
 from mtm_audit.tracking.gather import Progress, steady
 from mtm_audit.tracking.links import STATIONS, Box, Link, see_link, widened
-from mtm_audit.tracks import Floats, Track
 from mtm_onboard.protocol.errors import MtmError
 
 # Colours that stay apart in hue from each other, from red targets, pink walls and teal fingertips.

@@ -7,9 +7,9 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from mtm_audit.recordings.frames import Frame, Image
+from mtm_audit.model.picture import Frame, Image
+from mtm_audit.model.track import Floats, Track
 from mtm_audit.tracking.gather import Gather, Progress, steady
-from mtm_audit.tracks import Floats, Track
 from mtm_onboard.protocol.errors import MtmError
 
 FULL_SEARCH_EVERY = 15  # frames after which the whole picture is searched for markers that are new

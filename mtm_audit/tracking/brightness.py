@@ -6,11 +6,11 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from mtm_audit.recordings.frames import Frame, Image
+from mtm_audit.model.picture import Frame, Image
+from mtm_audit.model.track import Track
 from mtm_audit.tracking.gather import Gather, Progress, steady
 from mtm_audit.tracking.kalman import kalman_smoothed
 from mtm_audit.tracking.region import Region, checked_region, parse_region
-from mtm_audit.tracks import Track
 from mtm_onboard.protocol.errors import MtmError
 
 THRESHOLD = 60.0

@@ -5,10 +5,10 @@ from typing import Literal
 
 import cv2
 
-from mtm_audit.recordings.frames import Frame, Image
+from mtm_audit.model.picture import Frame, Image
+from mtm_audit.model.track import Track
 from mtm_audit.tracking.cover import Cover, cover_of, split_colours
 from mtm_audit.tracking.gather import Gather, Progress, steady
-from mtm_audit.tracks import Track
 from mtm_onboard.protocol.errors import MtmError
 
 _LEAST_COVER = 0.1  # of a pixel; less is the noise of compression

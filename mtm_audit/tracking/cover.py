@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_audit.recordings.frames import Image
+from mtm_audit.model.picture import Image
 from mtm_onboard.protocol.errors import MtmError
 
 NAMED_BGR = {

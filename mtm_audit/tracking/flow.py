@@ -7,11 +7,11 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from mtm_audit.recordings.frames import Frame, Image
+from mtm_audit.model.picture import Frame, Image
+from mtm_audit.model.track import Floats, Track
 from mtm_audit.tracking.gather import Gather, Progress, steady
 from mtm_audit.tracking.kalman import kalman_smoothed
 from mtm_audit.tracking.region import Region, checked_region, parse_region
-from mtm_audit.tracks import Floats, Track
 from mtm_onboard.protocol.errors import MtmError
 
 TRACK_NAME = "flow"

@@ -6,11 +6,11 @@ from typing import Literal
 
 import numpy as np
 
-from mtm_audit.recordings.frames import Frame
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Floats, Track
 from mtm_audit.tracking.colour import ColourTracker
 from mtm_audit.tracking.cover import split_colours
 from mtm_audit.tracking.gather import Progress
-from mtm_audit.tracks import Floats, Track
 
 TEAM_COLOURS = ("cyan", "magenta", "yellow")
 FULL_SEARCH_EVERY = 150  # the pictures are large and the colours nobody else's

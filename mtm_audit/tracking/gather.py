@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mtm_audit.recordings.frames import Frame
-from mtm_audit.tracks import Track
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Track
 from mtm_onboard.protocol.errors import MtmError
 
 Progress = Callable[[int], None]

@@ -6,7 +6,7 @@ import numpy as np
 from filterpy.common import Q_discrete_white_noise
 from filterpy.kalman import KalmanFilter
 
-from mtm_audit.tracks import Floats, Track
+from mtm_audit.model.track import Floats, Track
 
 
 def kalman_smoothed(track: Track, process_noise: float = 6.0, measurement_noise: float = 0.8) -> Track:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from mtm_audit.recordings.frames import Image
+from mtm_audit.model.picture import Image
+from mtm_audit.model.track import Floats
 from mtm_audit.tracking.cover import COVERED, Cover
-from mtm_audit.tracks import Floats
 
 STATIONS = 24  # across twice the length that a link first shows
 LEAST_AREA_PX = 40

@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from typing import Protocol
 
-from mtm_audit.recordings.frames import Frame, Pixels
+from mtm_audit.model.picture import Frame, Pixels
+from mtm_audit.model.track import Track
 from mtm_audit.tracking.gather import Progress
-from mtm_audit.tracks import Track
 from mtm_onboard.protocol.errors import MtmError
 
 TRACKERS = ", ".join(

@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mtm_onboard.message import Content
+    from mtm_onboard.runtime.message import Content
 
 _OPTIONS = {"message": "number", "text": "text", "hex": "hex", "symbols": "symbols"}
 
@@ -28,7 +28,7 @@ def content_table(args: argparse.Namespace) -> dict[str, Any]:
 
 def content(args: argparse.Namespace) -> "Content":
     """What was given; raises MtmError when it is malformed."""
-    from mtm_onboard.message import content_from_table
+    from mtm_onboard.runtime.message import content_from_table
 
     return content_from_table(content_table(args))
 

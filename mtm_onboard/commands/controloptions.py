@@ -13,8 +13,8 @@ def add_robot(parser: argparse.ArgumentParser) -> None:
 
 def socket_path(args: argparse.Namespace) -> Path:
     """The control socket; raises MtmError when the configuration names none."""
-    from mtm_onboard.config import load_config
     from mtm_onboard.protocol import MtmError
+    from mtm_onboard.runtime.config import load_config
 
     if args.socket is not None:
         return Path(args.socket)

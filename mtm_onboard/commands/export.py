@@ -34,11 +34,11 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def run(args: argparse.Namespace) -> int:
     """Write the image with mode 0600: it holds no secret, but whoever has it can play the message."""
-    from mtm_onboard.image import MAX_MESSAGES, channel_image, image_bytes, tagged
-    from mtm_onboard.message import message_of
+    from mtm_onboard.firmware.image import MAX_MESSAGES, channel_image, image_bytes, tagged
     from mtm_onboard.protocol import load_key
     from mtm_onboard.protocol.atomicfile import replacing
     from mtm_onboard.protocol.framing import channel_symbols
+    from mtm_onboard.runtime.message import message_of
 
     key = load_key(args.key)
     scheme = key.scheme

@@ -33,10 +33,10 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def _run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
-    from mtm_onboard.config import SourceSettings, load_config
-    from mtm_onboard.endingsignals import ending_signals
+    from mtm_onboard.control.session import Plan, run_session
     from mtm_onboard.protocol import load_key
-    from mtm_onboard.session import Plan, run_session
+    from mtm_onboard.runtime.config import SourceSettings, load_config
+    from mtm_onboard.runtime.ending_signals import ending_signals
 
     config, key = load_config(args.config), load_key(args.key)
     if args.stdin:

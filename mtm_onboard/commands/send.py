@@ -17,8 +17,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def _send(args: argparse.Namespace) -> int:
     from datetime import UTC, datetime
 
-    from mtm_onboard.control import called
-    from mtm_onboard.controlsocket import ask
+    from mtm_onboard.control.control import called
+    from mtm_onboard.control.control_socket import ask
 
     request = {"command": "silence"} if args.silence else {"command": "send", "content": content_table(args)}
     answer = ask(socket_path(args), request)

@@ -13,7 +13,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def _status(args: argparse.Namespace) -> int:
-    from mtm_onboard.controlsocket import ask
+    from mtm_onboard.control.control_socket import ask
 
     answer = ask(socket_path(args), {"command": "status"})
     link = {f"link {name}": value for name, value in answer.pop("link").items()}

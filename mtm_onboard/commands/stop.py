@@ -13,7 +13,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def _stop(args: argparse.Namespace) -> int:
-    from mtm_onboard.controlsocket import ask
+    from mtm_onboard.control.control_socket import ask
 
     ask(socket_path(args), {"command": "stop"})
     print("the robot stands still from its next tick on; start the run anew to move it again")

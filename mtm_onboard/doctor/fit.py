@@ -2,10 +2,10 @@
 
 import math
 
-from mtm_onboard.config import RobotConfig
 from mtm_onboard.doctor.finding import Finding
-from mtm_onboard.motion import AXES
+from mtm_onboard.model.velocity import AXES
 from mtm_onboard.protocol import Channel, Key, MtmError, Scheme
+from mtm_onboard.runtime.config import RobotConfig
 
 # Parts of the ticks whose noise a limit may cut: beyond the first auditors notice, beyond the second they read little.
 _MANY, _MOST = 0.01, 0.5

@@ -3,12 +3,12 @@
 import ctypes
 from pathlib import Path
 
-from mtm_onboard.clock import SystemClock
-from mtm_onboard.config import RealtimeSettings
 from mtm_onboard.doctor.finding import Finding
-from mtm_onboard.loop import LoopStats, run_loop
+from mtm_onboard.model.clock import SystemClock
 from mtm_onboard.protocol import Scheme
-from mtm_onboard.realtime import realtime
+from mtm_onboard.runtime.config import RealtimeSettings
+from mtm_onboard.runtime.loop import LoopStats, run_loop
+from mtm_onboard.runtime.realtime import realtime
 
 # Phase errors at the band's top, in degrees: of 15 auditors see nothing, and at 45 coherence begins to go.
 _NOTICED_DEG, _HARMFUL_DEG = 15.0, 45.0

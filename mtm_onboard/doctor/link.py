@@ -9,11 +9,11 @@ from collections.abc import Callable
 from contextlib import suppress
 from importlib.util import find_spec
 
-from mtm_onboard.config import Option
 from mtm_onboard.doctor.can_interface import check_interface
 from mtm_onboard.doctor.finding import Finding
+from mtm_onboard.links.factory import make_transport
 from mtm_onboard.protocol import MtmError
-from mtm_onboard.transports.factory import make_transport
+from mtm_onboard.runtime.config import Option
 
 Options = dict[str, Option]
 
@@ -97,7 +97,7 @@ def _check_none(options: Options) -> Finding:
 
 
 def _check_can(options: Options) -> Finding:
-    from mtm_onboard.transports.robomaster_messages import BITRATE
+    from mtm_onboard.links.robomaster_messages import BITRATE
 
     if find_spec("can") is None:
         return Finding("link", "fail", "python-can is not installed; install mtm[can] or python3-can")
@@ -123,7 +123,7 @@ def _check_uart(options: Options) -> Finding:
 
 
 def _check_robomaster_tcp(options: Options) -> Finding:
-    from mtm_onboard.transports.plaintext_messages import CONTROL_PORT, PUSH_PORT
+    from mtm_onboard.links.plaintext_messages import CONTROL_PORT, PUSH_PORT
 
     telemetry = check_udp_port("", int(options.get("push_port", PUSH_PORT)))
     if telemetry.status == "fail":

@@ -7,11 +7,11 @@ import stat
 import tempfile
 from pathlib import Path
 
-from mtm_onboard.config import ControlSettings, JournalSettings, SourceSettings
-from mtm_onboard.controlsocket import ControlSocket
+from mtm_onboard.control.control_socket import ControlSocket
 from mtm_onboard.doctor.finding import Finding
 from mtm_onboard.protocol import MtmError
-from mtm_onboard.source import UdpSource
+from mtm_onboard.runtime.config import ControlSettings, JournalSettings, SourceSettings
+from mtm_onboard.runtime.source import UdpSource
 
 # Where systemd makes a service's folder when it starts it.
 _RUNTIME_FOLDERS = Path("/run")

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_onboard.modulator import Modulator
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.runtime.modulator import Modulator
 
 Floats = NDArray[np.float64]
 

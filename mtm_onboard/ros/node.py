@@ -7,15 +7,15 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from mtm_onboard.clock import SystemClock
-from mtm_onboard.endingsignals import ending_signals
+from mtm_onboard.control.session import Ends, run_session
+from mtm_onboard.model.clock import SystemClock
 from mtm_onboard.protocol import MtmError, load_key
 from mtm_onboard.ros.parameters import DEFAULTS, config_of, key_path, plan_of
 from mtm_onboard.ros.spinning import Spinning
 from mtm_onboard.ros.twist import velocity_of
 from mtm_onboard.ros.twistlink import TwistLink
-from mtm_onboard.session import Ends, run_session
-from mtm_onboard.source import HeldSource
+from mtm_onboard.runtime.ending_signals import ending_signals
+from mtm_onboard.runtime.source import HeldSource
 
 # Commands that wait for a slow reader are old ones.
 _DEPTH = 1

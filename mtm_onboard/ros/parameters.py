@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from mtm_onboard.config import RobotConfig, config_from_table
+from mtm_onboard.control.session import Plan
 from mtm_onboard.protocol.errors import MtmError
-from mtm_onboard.session import Plan
+from mtm_onboard.runtime.config import RobotConfig, config_from_table
 
 # ROS has no parameter without a value: an empty text and a message below zero stand for none. The limits must be given.
 DEFAULTS: dict[str, str | int | float] = {

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from mtm_onboard.motion import BodyVelocity
+from mtm_onboard.model.velocity import BodyVelocity
 
 
 def velocity_of(twist: Any) -> BodyVelocity:

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import Any
 
-from mtm_onboard.motion import STOP, BodyVelocity
+from mtm_onboard.links.base import Transport
+from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.ros.twist import set_velocity
-from mtm_onboard.transports.base import Transport
 
 
 class TwistLink(Transport):

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from hil.robots.mecanum import MecanumPlant, calibrated_parameters
+from hil.plants.mecanum import MecanumPlant, calibrated_parameters
 from hil.worlds.robomaster import GoToGoal, routes
-from mtm_audit.tracks import Track
-from mtm_onboard.modulator import Modulator
-from mtm_onboard.motion import BodyVelocity
+from mtm_audit.model.track import Track
+from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import Channel, Key, Scheme
+from mtm_onboard.runtime.modulator import Modulator
 
 FAKE_SECRET = b"not a real secret, only for test"
 OTHER_SECRET = b"one more fake secret, only tests"

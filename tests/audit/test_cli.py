@@ -15,14 +15,14 @@ import pytest
 from hil.sensors.motion_capture import write_tum
 from hil.sensors.video import write_video
 from mtm_audit.cli import decode, main
-from mtm_audit.decode import DecodeSettings
-from mtm_audit.recordings.frames import Frame
+from mtm_audit.decoding.decode import DecodeSettings
+from mtm_audit.model.picture import Frame
 from mtm_onboard.protocol import save_key
 from tests.audit.moving_robot import FAKE_SECRET, OTHER_SECRET, key_of, robot_track, scheme_of
 
 KEY = key_of(scheme_of(symbols=(1, 1), ticks=400))
 ROOT = Path(__file__).parents[2]
-SCHEMA = json.loads((ROOT / "mtm_audit/decode.schema.json").read_text(encoding="utf-8"))
+SCHEMA = json.loads((ROOT / "mtm_audit/reporting/decode.schema.json").read_text(encoding="utf-8"))
 QUICK = ("--onset", "1", "--decoys", "30")
 PNG = b"\x89PNG\r\n"
 

@@ -5,12 +5,12 @@ The simulation of four robots runs five times faster than real time while this s
 
 import pytest
 
-from hil.robots.direct import DirectTransport
-from hil.robots.motion_controller import MotionController
-from mtm_onboard.clock import SystemClock
-from mtm_onboard.motion import BodyVelocity
-from tests.hil.robots.floating_plant import FloatingPlant
-from tests.onboard.transports.can_rig import LineRig, VirtualRig, can_rig
+from hil.fleet.direct import DirectTransport
+from hil.vehicles.motion_controller import MotionController
+from mtm_onboard.model.clock import SystemClock
+from mtm_onboard.model.velocity import BodyVelocity
+from tests.hil.vehicles.floating_plant import FloatingPlant
+from tests.onboard.links.can_rig import LineRig, VirtualRig, can_rig
 
 COMMAND = BodyVelocity(0.1, 0.2, 0.3)
 

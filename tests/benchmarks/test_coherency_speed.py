@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from mtm_audit.decode import DecodeSettings, decode_tracks
+from mtm_audit.decoding.decode import DecodeSettings, decode_tracks
+from mtm_audit.detectors.gcc_phat import RATE_SCALES
 from mtm_audit.detectors.welch import mean_coherency, segment_spectra
-from mtm_audit.glimpse import glimpse_of_track, tick_velocities
-from mtm_audit.timing import RATE_SCALES
+from mtm_audit.model.glimpse import glimpse_of_track, tick_velocities
 from mtm_onboard.protocol import Codebook
 from tests.audit.moving_robot import key_of, robot_track, scheme_of
 

@@ -6,12 +6,12 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from mtm_audit.decode import DecodeSettings
+from mtm_audit.decoding.decode import DecodeSettings
 from mtm_audit.detectors.base import Observation
 from mtm_audit.detectors.coherency import CoherencyDetector
 from mtm_audit.detectors.matched.detector import MatchedDetector
-from mtm_audit.glimpse import glimpse_of_track
-from mtm_audit.verdict import decoy_codebooks
+from mtm_audit.model.glimpse import glimpse_of_track
+from mtm_audit.significance.decoys import decoy_codebooks
 from tests.audit.moving_robot import key_of, robot_track, scheme_of
 
 pytestmark = pytest.mark.benchmark(timer=time.process_time)

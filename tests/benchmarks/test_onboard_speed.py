@@ -8,13 +8,13 @@ from itertools import count
 import numpy as np
 import pytest
 
-from mtm_onboard.guard import Guard, Limits, Staleness
-from mtm_onboard.modulator import Modulator
-from mtm_onboard.motion import BodyVelocity
+from mtm_onboard.links.none import NullTransport
+from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import Channel, Codebook, Scheme
-from mtm_onboard.runtime import Runtime
-from mtm_onboard.source import HeldSource
-from mtm_onboard.transports.none import NullTransport
+from mtm_onboard.runtime.guard import Guard, Limits, Staleness
+from mtm_onboard.runtime.modulator import Modulator
+from mtm_onboard.runtime.source import HeldSource
+from mtm_onboard.runtime.tick import Runtime
 
 BASE = BodyVelocity(0.3, 0.1, 0.2)
 

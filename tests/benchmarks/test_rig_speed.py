@@ -2,8 +2,8 @@
 
 import pytest
 
-from hil.lockstep import run_lockstep
-from tests.hil.fleet import fake_key, short_run
+from hil.fleet.lockstep import run_lockstep
+from tests.hil.fleet.short_runs import fake_key, short_run
 
 SECONDS = 10.0
 

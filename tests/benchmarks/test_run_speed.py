@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 from mtm_onboard.cli import main
-from mtm_onboard.config import RealtimeSettings, config_from_table
-from mtm_onboard.controlsocket import ask
-from mtm_onboard.journal import read_journal
+from mtm_onboard.control.control_socket import ask
+from mtm_onboard.control.session import Plan, run_session
+from mtm_onboard.journal.journal import read_journal
 from mtm_onboard.protocol import Channel, Key, MtmError, Scheme, load_key
-from mtm_onboard.realtime import realtime
-from mtm_onboard.session import Plan, run_session
+from mtm_onboard.runtime.config import RealtimeSettings, config_from_table
+from mtm_onboard.runtime.realtime import realtime
 
 RATE_HZ = 50.0
 BLOCKS, BLOCK_S, ROUNDS, STARTS = 10, 1.0, 3, 7

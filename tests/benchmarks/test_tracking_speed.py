@@ -13,7 +13,7 @@ from hil.sensors.camera import Camera, film
 from hil.sensors.poses import Trajectory
 from hil.sensors.scene import Scene
 from hil.sensors.video import write_video
-from mtm_audit.recordings.load import load_tracks
+from mtm_audit.ingest.load import load_tracks
 
 pytestmark = pytest.mark.benchmark(timer=time.process_time)
 SECONDS = 5.0

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mtm_audit.decode import DecodeSettings, decode_tracks
-from mtm_audit.recordings.motion_capture import read_csv
-from mtm_audit.tracks import Track
+from mtm_audit.decoding.decode import DecodeSettings, decode_tracks
+from mtm_audit.model.track import Track
+from mtm_audit.readers.motion_capture import read_csv
 from mtm_onboard.protocol import Key, load_key
 
 SCRIPT = Path(__file__).parents[2] / "examples" / "policy_noise.py"

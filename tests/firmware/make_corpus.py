@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from mtm_onboard.image import image_bytes
+from mtm_onboard.firmware.image import image_bytes
 from tests.firmware.shim_gateway import cut, speed_message
 from tests.firmware.test_playing import message_image
 from tests.firmware.test_wire import FRAMES, built

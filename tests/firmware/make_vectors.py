@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mtm_onboard.image import ONE, channel_image, image_bytes
+from mtm_onboard.firmware.image import ONE, channel_image, image_bytes
 from mtm_onboard.protocol import Channel, Codebook, Scheme
 from mtm_onboard.protocol.atomicfile import replacing
 from tests.firmware.shim_gateway import CONTROLLER, Board, Frame, cut, speed_message

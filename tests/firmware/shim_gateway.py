@@ -4,7 +4,7 @@ import struct
 from collections import deque
 from typing import NamedTuple
 
-from mtm_onboard.image import ONE
+from mtm_onboard.firmware.image import ONE
 from tests.firmware.shim_player import ShimPlayer
 
 COMPANION, CONTROLLER = 0, 1

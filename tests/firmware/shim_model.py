@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from mtm_onboard.image import ONE, Image, channel_image
+from mtm_onboard.firmware.image import ONE, Image, channel_image
 from mtm_onboard.protocol import Channel, Codebook, MtmError, Scheme
 
 Q20 = tuple[int, int, int]

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from hil.robots.shim_library import load_shim
-from mtm_onboard.image import Image, image_bytes
+from hil.vehicles.shim_library import load_shim
+from mtm_onboard.firmware.image import Image, image_bytes
 
 
 class ShimPlayer:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_onboard.image import ONE
+from mtm_onboard.firmware.image import ONE
 from tests.firmware.shim_gateway import (
     COMPANION,
     CONTROLLER,

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_onboard.image import MAX_Q20, ONE
+from mtm_onboard.firmware.image import MAX_Q20, ONE
 from tests.firmware.shim_player import ShimPlayer
 from tests.firmware.test_playing import WIDE, message_image
 

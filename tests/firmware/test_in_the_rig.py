@@ -1,8 +1,8 @@
 import numpy as np
 
-from hil.lockstep import run_lockstep
-from hil.robots.shim_modulator import ShimModulator
-from tests.hil.fleet import short_run
+from hil.fleet.lockstep import run_lockstep
+from hil.vehicles.shim_modulator import ShimModulator
+from tests.hil.fleet.short_runs import short_run
 
 
 def positions(**changes):

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mtm_onboard.image import MAX_Q20, ONE, channel_image
+from mtm_onboard.firmware.image import MAX_Q20, ONE, channel_image
 from mtm_onboard.protocol import Channel, Codebook, Scheme
 from tests.firmware.shim_model import (
     WIDE_LIMITS,

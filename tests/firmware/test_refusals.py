@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_onboard.image import image_bytes
+from mtm_onboard.firmware.image import image_bytes
 from tests.firmware.shim_player import ShimPlayer
 from tests.firmware.test_playing import WIDE, message_image
 

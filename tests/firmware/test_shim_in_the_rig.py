@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from hil.lockstep import run_lockstep
-from hil.rig import RunSettings
-from hil.robots.shim_modulator import ShimModulator
+from hil.fleet.lockstep import run_lockstep
+from hil.fleet.rig import RunSettings
+from hil.vehicles.shim_modulator import ShimModulator
 from hil.worlds.robomaster import fleet_scheme
-from mtm_onboard.modulator import Modulator
 from mtm_onboard.protocol import Key
+from mtm_onboard.runtime.modulator import Modulator
 
 SECRET = b"not a real secret, only for test"
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from hil.robots.shim_modulator import ShimModulator
-from mtm_onboard.modulator import Modulator
-from mtm_onboard.motion import BodyVelocity
+from hil.vehicles.shim_modulator import ShimModulator
+from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import Channel, Codebook, MtmError, Scheme
+from mtm_onboard.runtime.modulator import Modulator
 
 SECRET = b"not a real secret, only for test"
 BASE = BodyVelocity(0.3, -0.2, 0.1)

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from hil.robots.shim_library import load_shim
-from mtm_onboard.image import MAX_Q20, ONE
+from hil.vehicles.shim_library import load_shim
+from mtm_onboard.firmware.image import MAX_Q20, ONE
 
 FRAMES = [bytes.fromhex(entry["hex"]) for entry in json.loads((Path(__file__).parent / "duml_frames.json").read_text())]
 messages_st = st.lists(st.sampled_from(FRAMES), max_size=6)

@@ -8,14 +8,14 @@ from datetime import UTC, datetime
 
 import pytest
 
-from hil.cameras import CAMERAS
 from hil.cli import CameraName, main
-from hil.experiments.calibrate import SLIPS_MPS
-from hil.experiments.paper_figures import MARGINS
-from hil.lockstep import run_lockstep
-from hil.programs import program
-from mtm_audit.recordings.motion_capture import read_tum
-from mtm_audit.recordings.video import read_frames
+from hil.experiments.detectors.calibrate import SLIPS_MPS
+from hil.experiments.detectors.paper_figures import MARGINS
+from hil.fleet.lockstep import run_lockstep
+from hil.fleet.programs import program
+from hil.sensors.cameras import CAMERAS
+from mtm_audit.readers.motion_capture import read_tum
+from mtm_audit.readers.video import read_frames
 from mtm_onboard.cli import main as onboard
 from mtm_onboard.protocol import load_key
 
@@ -175,8 +175,8 @@ def quick_rollouts(monkeypatch):
         far = 1.0 + 10.0 * abs(parameters["slip_mps"] - 0.0425)
         return {"decodes": 4, "correct": 3, "margin": MARGINS[parameters["message_ticks"]] / far}
 
-    monkeypatch.setattr("hil.experiments.calibrate.decode_rollout", as_in_the_paper)
-    monkeypatch.setattr("hil.experiments.paper_robomaster.decode_rollout", as_in_the_paper)
+    monkeypatch.setattr("hil.experiments.detectors.calibrate.decode_rollout", as_in_the_paper)
+    monkeypatch.setattr("hil.experiments.detectors.paper_robomaster.decode_rollout", as_in_the_paper)
     monkeypatch.setattr("os.sched_getaffinity", lambda _: {0})
 
 

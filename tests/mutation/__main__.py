@@ -24,11 +24,14 @@ import mtm_onboard.protocol.journal_file  # noqa: F401
 from tests.mutation.mutate import Mutant, mutants_of
 
 ROOT = Path(__file__).parents[2]
-MODULE = "mtm_onboard.guard"
+MODULE = "mtm_onboard.runtime.guard"
 SOURCE = ROOT / "mtm_onboard" / "guard.py"
 EXPLAINED = ROOT / "docs" / "mutants.md"
 # The quickest first; the others run with what is left.
-TESTS = (("tests/onboard/test_guard.py",), ("tests/onboard/test_runtime.py", "tests/onboard/test_failsafes.py"))
+TESTS = (
+    ("tests/onboard/runtime/test_guard.py",),
+    ("tests/onboard/runtime/test_tick.py", "tests/onboard/runtime/test_failsafes.py"),
+)
 LONGEST_S = 120
 
 

@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 
-from hil.clock import SimulatedClock
-from mtm_onboard.guard import Guard, Limits, Staleness
-from mtm_onboard.journal import Journal
-from mtm_onboard.loop import LoopStats, run_loop
-from mtm_onboard.motion import BodyVelocity
-from mtm_onboard.runtime import NoiseAdder, Runtime
-from mtm_onboard.source import HeldSource, Source
-from mtm_onboard.transports.base import Transport
+from hil.fleet.clock import SimulatedClock
+from mtm_onboard.journal.journal import Journal
+from mtm_onboard.links.base import Transport
+from mtm_onboard.model.velocity import BodyVelocity
+from mtm_onboard.runtime.guard import Guard, Limits, Staleness
+from mtm_onboard.runtime.loop import LoopStats, run_loop
+from mtm_onboard.runtime.source import HeldSource, Source
+from mtm_onboard.runtime.tick import NoiseAdder, Runtime
 
 RATE_HZ = 50.0
 

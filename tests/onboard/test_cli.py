@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 from mtm_onboard.cli import main
-from mtm_onboard.client import BaseCommandClient
-from mtm_onboard.clock import SystemClock
-from mtm_onboard.guard import NOISE
-from mtm_onboard.journal import read_journal
-from mtm_onboard.modulator import Modulator
-from mtm_onboard.motion import BodyVelocity
+from mtm_onboard.journal.journal import read_journal
+from mtm_onboard.model.clock import SystemClock
+from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import load_key
 from mtm_onboard.protocol.framing import symbols_of_number
+from mtm_onboard.runtime.client import BaseCommandClient
+from mtm_onboard.runtime.guard import NOISE
+from mtm_onboard.runtime.modulator import Modulator
 
 # Its own for each test process, so that two at once on one machine do not meet.
 PORT = 40_000 + os.getpid() % 20_000

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mtm_onboard.guard import NOISE
-from mtm_onboard.journal import read_journal
-from mtm_onboard.message import message_of
-from mtm_onboard.modulator import Modulator
+from mtm_onboard.journal.journal import read_journal
 from mtm_onboard.protocol import load_key
+from mtm_onboard.runtime.guard import NOISE
+from mtm_onboard.runtime.message import message_of
+from mtm_onboard.runtime.modulator import Modulator
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = "python3,python3-numpy,python3-can,python3-serial,adduser,iproute2"
@@ -102,7 +102,7 @@ def files(*more: str) -> list[str]:
 
 
 def test_it_runs_on_the_libraries_that_debian_has(robot):
-    program = "import mtm_onboard.session, numpy, sys; print(numpy.__version__, mtm_onboard.__file__)"
+    program = "import mtm_onboard.control.session, numpy, sys; print(numpy.__version__, mtm_onboard.__file__)"
     version, place = as_root(robot, "python3", "-c", program).split()
     print(f"\nDebian's numpy is {version}")
     assert place.startswith("/usr/lib/python3/dist-packages/")

@@ -13,8 +13,8 @@ from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
 from mtm_audit.detectors.matched.correlate import Heard, Tones
 from mtm_audit.detectors.matched.hypotheses import log_rate_prior
 from mtm_audit.detectors.matched.motion import Motion
-from mtm_audit.timing import OnsetRange, Timing
-from mtm_audit.tracks import Floats
+from mtm_audit.model.timing import OnsetRange, Timing
+from mtm_audit.model.track import Floats
 
 _CHUNK = 256
 # Rates that move the recording's ends by half a cell against its middle, and starts in half cells.

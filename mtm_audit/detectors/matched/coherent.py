@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mtm_audit.detectors.matched.correlate import Heard, Tones, template_power
 from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE
-from mtm_audit.tracks import Bools, Floats
+from mtm_audit.model.track import Bools, Floats
 
 _FIRST_ROUNDS = 2
 _LAST_ROUNDS = 3

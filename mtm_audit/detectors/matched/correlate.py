@@ -11,7 +11,7 @@ from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, log_sum_exp
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import NoiseModel, power_response, whitened
 from mtm_audit.detectors.matched.plants import MEMORY_S, TAIL_S, plant_family, tone_responses
-from mtm_audit.tracks import Floats
+from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel
 

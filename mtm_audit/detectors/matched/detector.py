@@ -17,9 +17,9 @@ from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_audit.detectors.matched.refine import refined_timing
 from mtm_audit.detectors.matched.search import search_timings
 from mtm_audit.detectors.matched.windows import LEAST_PART, Window, make_windows
-from mtm_audit.timing import Onset, Timing
-from mtm_audit.tracks import Floats
-from mtm_audit.verdict import Evidence, weigh_log_evidence
+from mtm_audit.model.timing import Onset, Timing
+from mtm_audit.model.track import Floats
+from mtm_audit.significance.decoys import Evidence, weigh_log_evidence
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel

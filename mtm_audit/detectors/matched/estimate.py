@@ -18,7 +18,7 @@ from mtm_audit.detectors.matched.noise import NoiseModel, fit_noise, model_order
 from mtm_audit.detectors.matched.plants import COARSE, FINE
 from mtm_audit.detectors.matched.profile import PlantProfile, log_prior
 from mtm_audit.detectors.matched.windows import Statistics, Window, response_rows, statistics
-from mtm_audit.tracks import Floats
+from mtm_audit.model.track import Floats
 
 _ROUNDS = 3
 _KEPT = 64

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mtm_audit.tracks import Floats
+from mtm_audit.model.track import Floats
 
 # Prior variance of a gain, in units of the innovation's standard deviation per unit of waveform.
 GAIN_VARIANCE = 6.0

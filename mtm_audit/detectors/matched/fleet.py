@@ -17,8 +17,8 @@ from mtm_audit.detectors.matched.hypotheses import log_rate_prior
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.search import candidate_rates, lead_cells, waveform_sets
 from mtm_audit.detectors.matched.windows import LEAST_PART
-from mtm_audit.timing import Onset, Timing
-from mtm_audit.tracks import Floats
+from mtm_audit.model.timing import Onset, Timing
+from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel, Scheme
 

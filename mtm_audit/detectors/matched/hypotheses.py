@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mtm_audit.detectors.matched.motion import Motion
-from mtm_audit.timing import Onset, OnsetRange
-from mtm_audit.tracks import Bools, Floats
+from mtm_audit.model.timing import Onset, OnsetRange
+from mtm_audit.model.track import Bools, Floats
 
 _DRIFT_S = 0.02
 # Clocks that are off by more than this are possible but rare: the scale of a Cauchy prior over relative rates.

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from mtm_audit.glimpse import Glimpse
-from mtm_audit.tracks import Bools, Floats
+from mtm_audit.model.glimpse import Glimpse
+from mtm_audit.model.track import Bools, Floats
 from mtm_onboard.protocol.errors import MtmError
 
 # Cells of a fifth of the highest tone's period: little of the band is averaged away, little beyond it folds back.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mtm_audit.tracks import Bools, Floats
+from mtm_audit.model.track import Bools, Floats
 
 _DEGREES_OF_FREEDOM = 5.0
 _ROUNDS = 6

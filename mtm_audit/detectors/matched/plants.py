@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_audit.tracks import Floats
+from mtm_audit.model.track import Floats
 
 Complexes = NDArray[np.complex128]
 

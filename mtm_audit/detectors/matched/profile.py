@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from mtm_audit.detectors.matched.plants import FINE, Plants
-from mtm_audit.tracks import Floats
+from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
 

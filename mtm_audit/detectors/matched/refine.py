@@ -9,7 +9,7 @@ from mtm_audit.detectors.matched.estimate import Estimate
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import whitened
 from mtm_audit.detectors.matched.windows import Window
-from mtm_audit.timing import Timing
+from mtm_audit.model.timing import Timing
 
 # A drift below this over the recording changes nothing.
 _NEGLIGIBLE_S = 0.002

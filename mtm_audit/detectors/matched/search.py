@@ -16,8 +16,8 @@ from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
 from mtm_audit.detectors.matched.correlate import Heard, Prepared, Tones, evidence_by_lag, hear, stacked_tones
 from mtm_audit.detectors.matched.hypotheses import Grid, Hypothesis, fold, make_grid
 from mtm_audit.detectors.matched.motion import Motion
-from mtm_audit.timing import Onset, OnsetRange, Timing
-from mtm_audit.tracks import Floats
+from mtm_audit.model.timing import Onset, OnsetRange, Timing
+from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel, Scheme
 

@@ -8,8 +8,8 @@ import numpy as np
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import NoiseModel, whitened
 from mtm_audit.detectors.matched.plants import TAIL_S, Plants, tone_responses
-from mtm_audit.timing import Timing
-from mtm_audit.tracks import Floats
+from mtm_audit.model.timing import Timing
+from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel
 

@@ -6,10 +6,10 @@ import pytest
 from mtm_audit.detectors import make_detector
 from mtm_audit.detectors.base import Observation, Reading, combine_repeats, whole_windows
 from mtm_audit.detectors.coherency import CoherencyDetector, rate_searched_scores
-from mtm_audit.glimpse import Glimpse, glimpse_of_track
-from mtm_audit.timing import Timing
-from mtm_audit.tracks import Track
-from mtm_audit.verdict import decoy_codebooks
+from mtm_audit.model.glimpse import Glimpse, glimpse_of_track
+from mtm_audit.model.timing import Timing
+from mtm_audit.model.track import Track
+from mtm_audit.significance.decoys import decoy_codebooks
 from mtm_onboard.protocol import MtmError
 from tests.audit.moving_robot import key_of, robot_track, scheme_of
 

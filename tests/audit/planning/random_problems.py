@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hil.experiments.intervals import clopper_pearson
+from hil.experiments.runs.intervals import clopper_pearson
 from mtm_audit.planning.plan import Plan, Problem
 from mtm_audit.planning.report import fastest
 from mtm_audit.planning.search import search

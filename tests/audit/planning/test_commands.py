@@ -221,6 +221,6 @@ def test_help_loads_neither_the_planner_nor_opencv():
 
 
 def test_the_table_that_the_project_measured_can_be_planned_with(audit):
-    path = Path(__file__).parents[3] / "hil/experiments/results/accuracy_table.csv"
+    path = Path(__file__).parents[3] / "results/accuracy_table.csv"
     assert len(read_table(path).channels) == 15
     assert audit("plan", path, "--bits", "8", "--rate", "50")[0] == 0

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hil.experiments.intervals import clopper_pearson
+from hil.experiments.runs.intervals import clopper_pearson
 from mtm_audit.planning.curve import fit_curve
 from mtm_audit.planning.interval import message_interval
 from mtm_audit.planning.table import AccuracyPoint

@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from mtm_audit.recordings.frames import Frame
+from mtm_audit.model.picture import Frame
 from mtm_audit.tracking.brightness import BrightnessTracker
 from mtm_audit.tracking.kalman import kalman_smoothed
 from mtm_audit.tracking.registry import tracker

@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from mtm_audit.recordings.frames import Frame
+from mtm_audit.model.picture import Frame
 from mtm_audit.tracking.centroid import CentroidTracker
 from mtm_audit.tracking.registry import tracker
 from mtm_onboard.protocol import MtmError

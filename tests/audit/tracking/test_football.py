@@ -2,10 +2,10 @@ import cv2
 import numpy as np
 import pytest
 
-from mtm_audit.recordings.frames import Frame
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Track
 from mtm_audit.tracking.football import FootballTracker, without_jumps
 from mtm_audit.tracking.registry import tracker
-from mtm_audit.tracks import Track
 from mtm_onboard.protocol import MtmError
 
 FRAMES = 90

@@ -8,7 +8,7 @@ import pytest
 
 from hil.sensors.video import write_video
 from mtm_audit.cli import main
-from mtm_audit.recordings.frames import Frame
+from mtm_audit.model.picture import Frame
 from mtm_onboard.protocol import Channel, Scheme, save_key
 from tests.audit.moving_robot import key_of
 from tests.audit.tracking.test_arms import arm

@@ -9,13 +9,13 @@ from hil.sensors.optics import Optics, overhead
 from hil.sensors.poses import Occlusion, Trajectory
 from hil.sensors.scene import Scene
 from hil.sensors.video import write_video
-from mtm_audit.recordings.frames import Frame
-from mtm_audit.recordings.load import load_tracks
-from mtm_audit.recordings.video import read_frames
+from mtm_audit.ingest.load import load_tracks
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Track
+from mtm_audit.readers.video import read_frames
 from mtm_audit.tracking.aruco import ArucoTracker
 from mtm_audit.tracking.kalman import kalman_smoothed
 from mtm_audit.tracking.registry import tracker
-from mtm_audit.tracks import Track
 from mtm_onboard.protocol import MtmError
 
 SECONDS = 1.2

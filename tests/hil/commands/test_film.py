@@ -3,7 +3,7 @@ import json
 import pytest
 
 from hil.cli import main
-from hil.experiments.world_points import headline_point
+from hil.experiments.worlds.points import headline_point
 from mtm_audit.cli import main as audit
 from mtm_onboard.protocol import Key, generate_key, load_key, save_key
 from tests.audit.moving_robot import scheme_of

@@ -3,8 +3,8 @@ import csv
 from rich.console import Console
 
 from hil.commands.frames import frames
-from hil.experiments.cells import CellStore
-from hil.experiments.frames import frame_cells
+from hil.experiments.messages.frames import frame_cells
+from hil.experiments.runs.cells import CellStore
 
 
 def test_the_table_comes_from_the_finished_cells_with_its_command_line(tmp_path, capsys):

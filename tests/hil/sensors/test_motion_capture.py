@@ -3,8 +3,8 @@ import pytest
 
 from hil.sensors.motion_capture import MotionCapture, capture, write_tum, write_tum_files
 from hil.sensors.poses import Occlusion, Trajectory
-from mtm_audit.recordings.motion_capture import read_tum
-from mtm_audit.tracks import Track
+from mtm_audit.model.track import Track
+from mtm_audit.readers.motion_capture import read_tum
 from mtm_onboard.protocol import MtmError
 
 

@@ -14,10 +14,10 @@ from hil.worlds.noise import keyed_noise
 from hil.worlds.schemes import same_scheme
 from hil.worlds.world import Rollout
 from mtm_audit.detectors.coherency import rate_searched_scores
-from mtm_audit.glimpse import glimpse_of_track
-from mtm_audit.recordings.frames import Frame
-from mtm_audit.recordings.video import read_frames
-from mtm_audit.tracks import Floats
+from mtm_audit.model.glimpse import glimpse_of_track
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Floats
+from mtm_audit.readers.video import read_frames
 from mtm_onboard.protocol import Codebook, MtmError
 
 SECRET = b"not a real secret, only for test"

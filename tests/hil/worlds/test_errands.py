@@ -3,10 +3,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hil.lockstep import run_lockstep
+from hil.fleet.lockstep import run_lockstep
 from hil.worlds.errands import ERRANDS, any_errand
 from hil.worlds.robomaster import routes
-from tests.hil.fleet import short_run
+from tests.hil.fleet.short_runs import short_run
 
 SECONDS = 12.0
 ROUTE = routes((0, 1, 2, 3))[0]

@@ -9,8 +9,8 @@ from hil.sensors.video import write_video
 from hil.worlds.noise import keyed_noise
 from hil.worlds.schemes import same_scheme
 from mtm_audit.detectors.coherency import rate_searched_scores
-from mtm_audit.glimpse import glimpse_of_track
-from mtm_audit.recordings.video import read_frames
+from mtm_audit.model.glimpse import glimpse_of_track
+from mtm_audit.readers.video import read_frames
 from mtm_onboard.protocol import Codebook, MtmError
 
 lunar_lander = pytest.importorskip("gymnasium.envs.box2d.lunar_lander")

@@ -15,9 +15,9 @@ from hil.worlds.reacher_policy import trained_policy
 from hil.worlds.schemes import single_scheme
 from hil.worlds.world import Shot
 from mtm_audit.detectors.coherency import rate_searched_scores
-from mtm_audit.glimpse import glimpse_of_track
-from mtm_audit.recordings.video import read_frames
-from mtm_audit.tracks import Floats, Track
+from mtm_audit.model.glimpse import glimpse_of_track
+from mtm_audit.model.track import Floats, Track
+from mtm_audit.readers.video import read_frames
 from mtm_onboard.protocol import Codebook, MtmError
 from mtm_onboard.protocol.waveform import evaluate
 

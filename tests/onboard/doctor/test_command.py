@@ -5,7 +5,7 @@ import pytest
 
 from mtm_onboard.cli import main
 from mtm_onboard.doctor.finding import Finding, worst
-from mtm_onboard.transports.none import NullTransport
+from mtm_onboard.links.none import NullTransport
 
 CONFIG = """
 [robot]

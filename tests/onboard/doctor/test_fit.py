@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mtm_onboard.config import Robot, config_from_table
 from mtm_onboard.doctor.fit import _relative_change, check_fit
-from mtm_onboard.modulator import Modulator
 from mtm_onboard.protocol import Channel, Key
+from mtm_onboard.runtime.config import Robot, config_from_table
+from mtm_onboard.runtime.modulator import Modulator
 from tests.onboard.schemes import FAKE_SECRET, small_codebook, small_scheme
 
 KEY = Key("fake-key", FAKE_SECRET, small_scheme())

@@ -3,9 +3,9 @@ import sys
 
 import pytest
 
-from mtm_onboard.config import RealtimeSettings
 from mtm_onboard.doctor.host import check_clock, check_loop, check_processors, is_synchronised, lateness_finding
-from mtm_onboard.loop import LoopStats
+from mtm_onboard.runtime.config import RealtimeSettings
+from mtm_onboard.runtime.loop import LoopStats
 from tests.onboard.schemes import small_scheme
 
 SCHEME = small_scheme(band_hz=(0.5, 5.0))

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mtm_onboard.doctor.link import check_link, check_serial
-from mtm_onboard.transports import factory
+from mtm_onboard.links import factory
 
 
 @pytest.fixture

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from mtm_onboard.config import ControlSettings, JournalSettings, SourceSettings
-from mtm_onboard.controlsocket import ControlSocket
+from mtm_onboard.control.control_socket import ControlSocket
 from mtm_onboard.doctor.places import check_control, check_journal, check_key_file, check_source
+from mtm_onboard.runtime.config import ControlSettings, JournalSettings, SourceSettings
 
 
 @pytest.fixture

@@ -9,7 +9,6 @@ from itertools import count
 import numpy as np
 import pytest
 
-from mtm_onboard.modulator import Modulator
 from mtm_onboard.policies import (
     KeyedActionNoise,
     KeyedNoise,
@@ -18,6 +17,7 @@ from mtm_onboard.policies import (
     register_with_stable_baselines3,
 )
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.runtime.modulator import Modulator
 from tests.onboard.schemes import small_codebook
 
 

@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import kstest
 
-from mtm_onboard.modulator import Modulator
 from mtm_onboard.policies import ActionBounds, KeyedGaussian, KeyedNoise, VectorKeyedNoise
 from mtm_onboard.protocol import Channel, Codebook, MtmError
+from mtm_onboard.runtime.modulator import Modulator
 from tests.onboard.schemes import FAKE_SECRET, small_scheme
 
 MEAN, STD = np.array([0.2, -0.4]), np.array([0.5, 2.0])

@@ -6,9 +6,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import SyncVectorEnv
 
-from mtm_onboard.modulator import Modulator
 from mtm_onboard.policies import KeyedNoise, add_to_actions, gymactions
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.runtime.modulator import Modulator
 from tests.onboard.schemes import small_codebook
 
 

@@ -5,10 +5,10 @@ from itertools import count
 import numpy as np
 import pytest
 
-from mtm_onboard.message import SILENCE
-from mtm_onboard.modulator import Modulator
 from mtm_onboard.policies import KeyedNoise, VectorKeyedNoise
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.runtime.message import SILENCE
+from mtm_onboard.runtime.modulator import Modulator
 from tests.onboard.schemes import FAKE_SECRET, small_codebook
 
 

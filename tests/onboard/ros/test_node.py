@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mtm_onboard.guard import NOISE
-from mtm_onboard.journal import read_journal
-from mtm_onboard.modulator import Modulator
+from mtm_onboard.journal.journal import read_journal
 from mtm_onboard.protocol import Key, save_key
 from mtm_onboard.protocol.framing import number_of_symbols
 from mtm_onboard.ros.node import main
+from mtm_onboard.runtime.guard import NOISE
+from mtm_onboard.runtime.modulator import Modulator
 from tests.onboard.ros.fake_ros import FakeRos, twist
 from tests.onboard.schemes import FAKE_SECRET, small_codebook, small_scheme
 

@@ -3,10 +3,10 @@ from pathlib import Path
 
 import pytest
 
-from mtm_onboard.config import ControlSettings, JournalSettings, Robot
-from mtm_onboard.guard import Limits, Staleness
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.ros.parameters import DEFAULTS, config_of, key_path, plan_of
+from mtm_onboard.runtime.config import ControlSettings, JournalSettings, Robot
+from mtm_onboard.runtime.guard import Limits, Staleness
 
 PAGE = (Path(__file__).parents[3] / "docs" / "policies-and-ros2.md").read_text()
 GIVEN = DEFAULTS | {"key": "/etc/mtm/r.key", "channel": "a", "speed_mps": 1, "turn_rate_radps": 2.5}

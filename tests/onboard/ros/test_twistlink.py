@@ -5,17 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from hil.clock import SimulatedClock
-from hil.robots.motion_controller import MotionController
-from mtm_onboard.modulator import Modulator
-from mtm_onboard.motion import STOP, BodyVelocity
+from hil.fleet.clock import SimulatedClock
+from hil.vehicles.motion_controller import MotionController
+from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.ros.twist import set_velocity, velocity_of
 from mtm_onboard.ros.twistlink import TwistLink
-from tests.hil.robots.floating_plant import FloatingPlant
+from mtm_onboard.runtime.modulator import Modulator
+from tests.hil.vehicles.floating_plant import FloatingPlant
 from tests.onboard.driven import Driven
+from tests.onboard.links.conformance import Rig, TransportConformance
 from tests.onboard.ros.fake_ros import Twist, Vector3, twist
 from tests.onboard.schemes import small_codebook
-from tests.onboard.transports.conformance import Rig, TransportConformance
 
 
 class TestTwistLinkConforms(TransportConformance):

@@ -5,17 +5,17 @@ from functools import lru_cache
 
 import numpy as np
 
-from hil.lockstep import run_lockstep
-from hil.recording import motion_capture_tracks
-from hil.rig import RunSettings, seeds_of
+from hil.fleet.lockstep import run_lockstep
+from hil.fleet.recording import motion_capture_tracks
+from hil.fleet.rig import RunSettings, seeds_of
 from hil.sensors.motion_capture import MotionCapture
 from hil.worlds.robomaster import fleet_scheme
 from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recording_noise
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
 from mtm_audit.detectors.matched.windows import Window, make_windows
-from mtm_audit.glimpse import glimpse_of_track
-from mtm_audit.timing import Timing
-from mtm_audit.tracks import Track
+from mtm_audit.model.glimpse import glimpse_of_track
+from mtm_audit.model.timing import Timing
+from mtm_audit.model.track import Track
 from mtm_onboard.protocol import Key
 
 FAKE_SECRET = b"not a real secret, only for test"

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hil.experiments.robustness import JOBS, read_under
+from hil.experiments.detectors.robustness import JOBS, read_under
 from mtm_audit.detectors.base import Observation
 from mtm_audit.detectors.matched.byclock import Found
 from mtm_audit.detectors.matched.correlate import prepare
@@ -13,9 +13,9 @@ from mtm_audit.detectors.matched.detector import MatchedDetector
 from mtm_audit.detectors.matched.estimate import fit_recording_noise
 from mtm_audit.detectors.matched.fleet import Member, share_timings
 from mtm_audit.detectors.matched.motion import uniform_motion
-from mtm_audit.glimpse import glimpse_of_track
-from mtm_audit.timing import Timing
-from mtm_audit.verdict import decoy_codebooks
+from mtm_audit.model.glimpse import glimpse_of_track
+from mtm_audit.model.timing import Timing
+from mtm_audit.significance.decoys import decoy_codebooks
 from tests.audit.moving_robot import key_of, robot_track, scheme_of
 
 KEY = key_of(scheme_of(symbols=(2, 2, 2), ticks=400))

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from mtm_audit.detectors.matched.motion import uniform_motion
-from mtm_audit.glimpse import glimpse_of_track
-from mtm_audit.tracks import Track
+from mtm_audit.model.glimpse import glimpse_of_track
+from mtm_audit.model.track import Track
 from mtm_onboard.protocol import MtmError
 
 HIGHEST_HZ = 5.0

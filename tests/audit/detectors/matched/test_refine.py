@@ -5,7 +5,7 @@ import pytest
 
 from mtm_audit.detectors.matched.estimate import estimate, fit_recording_noise
 from mtm_audit.detectors.matched.refine import refined_timing
-from mtm_audit.timing import Timing
+from mtm_audit.model.timing import Timing
 from tests.audit.detectors.matched.fleet_motion import RATE_HZ, START_S, fleet_run, motions_of, windows_of
 
 TICK_S = 1.0 / RATE_HZ

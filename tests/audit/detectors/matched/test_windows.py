@@ -14,7 +14,7 @@ from mtm_audit.detectors.matched.windows import (
     response_rows,
     statistics,
 )
-from mtm_audit.timing import Timing
+from mtm_audit.model.timing import Timing
 from tests.audit.moving_robot import key_of, scheme_of
 
 KEY = key_of(scheme_of(symbols=(2,), ticks=200, alphabet=8))

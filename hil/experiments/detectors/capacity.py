@@ -1,0 +1,45 @@
+"""Shannon's bound on what one robot could send through the plant against the interference that was measured."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import welch
+
+from hil.plants.mecanum import MecanumParameters
+from mtm_audit.detectors.matched.motion import Motion
+from mtm_audit.model.track import Floats
+
+_SEGMENT_CELLS = 64
+_FREQUENCIES = 400
+
+
+def capacity_bps(
+    plant: MecanumParameters, sigma: float, rate_hz: float, band_hz: tuple[float, float], silences: Sequence[Motion]
+) -> float:
+    """Bits per second of one robot over its axes, with the power spread evenly over the band.
+
+    `silences` are motions without a message. The interference counts as Gaussian with their mean spectrum; what a
+    detector gains where it is quieter than that comes on top.
+    """
+    step_s = silences[0].step_s
+    measured_hz, _ = welch(silences[0].velocities, 1.0 / step_s, nperseg=_SEGMENT_CELLS)
+    frequencies_hz = np.linspace(*band_hz, _FREQUENCIES)
+    mean = np.mean([_spectrum(motion) for motion in silences], axis=0)
+    interference = np.array([np.interp(frequencies_hz, measured_hz, axis) for axis in mean])
+    # A sum of evenly spaced tones in the band, held over each tick, lagged, and averaged over each cell.
+    sent = sigma**2 / (band_hz[1] - band_hz[0])
+    gain = _gain(plant, rate_hz, step_s, frequencies_hz)
+    bits = np.log2(1.0 + sent * gain / interference).mean(axis=1)
+    return float(bits.sum() * (band_hz[1] - band_hz[0]))
+
+
+def _spectrum(motion: Motion) -> Floats:
+    """One-sided power density of each axis, (axes, frequencies)."""
+    density: Floats = welch(motion.velocities, 1.0 / motion.step_s, nperseg=_SEGMENT_CELLS)[1]
+    return density
+
+
+def _gain(plant: MecanumParameters, rate_hz: float, step_s: float, frequencies_hz: Floats) -> Floats:
+    held, averaged = np.sinc(frequencies_hz / rate_hz), np.sinc(frequencies_hz * step_s)
+    gain: Floats = (held * averaged) ** 2 / (1.0 + (2.0 * np.pi * frequencies_hz * plant.lag_s) ** 2)
+    return gain

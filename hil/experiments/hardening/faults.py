@@ -1,0 +1,204 @@
+"""The fault matrix: every fault of a wire alone and together with a lost link, on every wire, from end to end.
+
+The robot has to stand still `STALE_S` after the last base command, whatever the wire does, and after the link is lost
+within the deadman of the robot at its far end, where it has one. `GRACE_S` is a tick and two polls of the wire; a wire
+that loses, holds up or spoils messages may take `LATE_S` longer, since a stop is one of them.
+"""
+
+import math
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from hil.experiments.hardening.fault_run import (
+    DEADMEN_S,
+    END_S,
+    FOUND_S,
+    LOST_S,
+    SILENT_S,
+    START_S,
+    Fault,
+    FaultRun,
+    run_fault,
+)
+from hil.experiments.runs.cells import Cell, Scalar, Values
+from hil.fleet.rig import SAMPLE_PERIOD_S
+from hil.sensors.motion_capture import MotionCapture, capture
+from hil.sensors.poses import Trajectory
+from hil.wires.faulty_wire import WireFaults
+from hil.worlds.robomaster import fleet_scheme
+from mtm_audit.decoding.decode import DecodeSettings, decode_tracks
+from mtm_onboard.model.velocity import STOP
+from mtm_onboard.protocol import Channel, Key
+from mtm_onboard.protocol.journal_file import NOISE, UNSENT, JournalRecord
+from mtm_onboard.runtime.guard import Staleness
+
+WIRES = tuple(DEADMEN_S)
+LOSSES = ("", "cut", "swallowed")
+FAULTS = {
+    "none": Fault(),
+    "drop": Fault(WireFaults(drop=0.1)),
+    "delay": Fault(WireFaults(delay_s=(0.02, 0.1))),
+    "duplicate": Fault(WireFaults(duplicate=0.1)),
+    "corrupt": Fault(WireFaults(corrupt=0.05)),
+    "reorder": Fault(WireFaults(reorder=0.1)),
+    "quantise": Fault(grain=0.05),
+    "saturate": Fault(most=0.25),
+    "block": Fault(WireFaults(block_s=0.06)),
+}
+STALE_S = Staleness().stopped_s
+GRACE_S = 0.04
+LATE_S = 0.1
+
+_SYMBOLS = (3, 1)
+_WINDOW_TICKS = 200
+_SAME = 2e-4  # what plaintext rounds off, in m/s and rad/s, and a hair
+_MOSTLY = 0.75
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one run came to; ages and times in seconds.
+
+    `altered` commands came into force that were never sent. `arrived_s` is the age of the oldest command with which
+    motion began, `held_s` the greatest age that a command in force reached. `lost_stop_s` is from the loss of the link
+    to the stop, -1 when the robot did not stop before the wire was whole again and 0 when there was no loss.
+    `silent_stop_s` is from the last base command to the last stop.
+    Of `windows` of the message `sent` have left the runtime for the most part, within what the robot can do;
+    `message_is_due` when these hold every symbol, and `is_decoded` when it was decoded, and right.
+    """
+
+    altered: int
+    arrived_s: float
+    held_s: float
+    lost_stop_s: float
+    silent_stop_s: float
+    losses: int
+    windows: int
+    sent: int
+    message_is_due: bool
+    is_decoded: bool
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """One row of the matrix: an outcome beside its deadlines; `lost_deadline_s` None for a robot without a deadman."""
+
+    wire: str
+    fault: str
+    loss: str
+    seed: int
+    outcome: Outcome
+    silent_deadline_s: float
+    lost_deadline_s: float | None
+
+    @property
+    def stops(self) -> bool:
+        """Whether the robot stood still by every deadline that it has."""
+        outcome = self.outcome
+        in_time = outcome.silent_stop_s <= self.silent_deadline_s
+        if self.loss and self.lost_deadline_s is not None:
+            in_time = in_time and 0.0 <= outcome.lost_stop_s <= self.lost_deadline_s
+        return in_time
+
+    @property
+    def is_fresh(self) -> bool:
+        """Whether no motion began with a stale command."""
+        return self.outcome.arrived_s <= STALE_S
+
+    @property
+    def is_read(self) -> bool:
+        """Whether the message was decoded if it was sent whole."""
+        return self.outcome.is_decoded or not self.outcome.message_is_due
+
+
+def fault_cells(seeds: int, first_seed: int, wires: Sequence[str] = WIRES) -> list[Cell]:
+    """Every fault with every loss on every wire."""
+    return [
+        Cell("faults", {"wire": wire, "fault": fault, "loss": loss}, first_seed + number)
+        for wire in wires
+        for fault in FAULTS
+        for loss in LOSSES
+        for number in range(seeds)
+    ]
+
+
+def fault_cell(parameters: Values, seed: int) -> dict[str, Scalar]:
+    """Run one cell and read its motion; the fields of an `Outcome`."""
+    draw = np.random.default_rng([17, seed])
+    fleet = fleet_scheme(len(_SYMBOLS) * _WINDOW_TICKS)
+    scheme = replace(fleet, channels=(Channel("robot0", "robot0", ("vx", "vy"), len(_SYMBOLS), 0.1),))
+    key = Key("faults", draw.bytes(32), scheme)
+    with tempfile.TemporaryDirectory() as folder:
+        run = run_fault(
+            str(parameters["wire"]), FAULTS[str(parameters["fault"])], str(parameters["loss"]), key, _SYMBOLS, seed,
+            Path(folder),
+        )  # fmt: skip
+    return assess(run, bool(parameters["loss"]), FAULTS[str(parameters["fault"])].most) | _decoded(run, key, draw)
+
+
+def line_of(cell: Cell, result: Values) -> Line:
+    """The row of a finished cell."""
+    wire, fault, loss = (str(cell.parameters[name]) for name in ("wire", "fault", "loss"))
+    late_s = LATE_S if FAULTS[fault].wire != WireFaults() else 0.0
+    deadman_s = DEADMEN_S[wire]
+    outcome = Outcome(**result)  # type: ignore[arg-type]
+    return Line(
+        wire, fault, loss, cell.seed, outcome, STALE_S + GRACE_S + late_s,
+        None if deadman_s is None else deadman_s + GRACE_S + late_s,
+    )  # fmt: skip
+
+
+def assess(run: FaultRun, is_lost: bool, most: float = np.inf) -> dict[str, Scalar]:
+    """What the robot did, beside what the journal says it was told; it cannot do more than `most` on any axis."""
+    altered, arrived_s, held_s = 0, 0.0, 0.0
+    ends_s = [when_s for when_s, _ in run.in_force[1:]] + [END_S]
+    for (when_s, velocity), end_s in zip(run.in_force, ends_s, strict=True):
+        if velocity == STOP:
+            continue
+        sent_s = _sent_s(run.journal, np.array(velocity), when_s)
+        if sent_s is None:
+            altered, sent_s = altered + 1, when_s
+        arrived_s, held_s = max(arrived_s, when_s - sent_s), max(held_s, end_s - sent_s)
+    stops_s = [when_s for when_s, velocity in run.in_force if velocity == STOP and LOST_S <= when_s < FOUND_S]
+    lost_stop_s = (stops_s[0] - LOST_S if stops_s else -1.0) if is_lost else 0.0
+    moved_s = max(end_s for (_, velocity), end_s in zip(run.in_force, ends_s, strict=True) if velocity != STOP)
+    rate_hz = run.journal.header.rate_hz
+    last_base_s = START_S + math.ceil((SILENT_S - START_S) * rate_hz - 1e-6) / rate_hz - 1.0 / rate_hz
+    sent = _windows_sent(run.journal, most)
+    return {
+        "altered": altered, "arrived_s": round(arrived_s, 4), "held_s": round(held_s, 4),
+        "lost_stop_s": round(lost_stop_s, 4), "silent_stop_s": round(moved_s - last_base_s, 4), "losses": run.losses,
+        "windows": len(sent), "sent": sum(sent),
+        "message_is_due": all(any(sent[place :: len(_SYMBOLS)]) for place in range(len(_SYMBOLS))),
+    }  # fmt: skip
+
+
+def _sent_s(journal: JournalRecord, velocity: np.ndarray, by_s: float) -> float | None:
+    """When that command was last sent, by then; None when it never was."""
+    times_s = START_S + journal.ticks / journal.header.rate_hz
+    same = np.all(np.abs(journal.sent - velocity) < _SAME, axis=1) & (times_s <= by_s + 1e-9)
+    return float(times_s[same][-1]) if np.any(same) else None
+
+
+def _windows_sent(journal: JournalRecord, most: float) -> list[bool]:
+    """For each window of the message until the controller fell silent, whether most of it has left and can be done."""
+    count = int((SILENT_S - START_S) * journal.header.rate_hz) // _WINDOW_TICKS
+    left = np.zeros(count * _WINDOW_TICKS, dtype=np.bool_)
+    with_noise = ((journal.flags & (NOISE | UNSENT)) == NOISE) & np.all(np.abs(journal.sent) <= most, axis=1)
+    ticks = journal.ticks[with_noise]
+    left[ticks[(ticks >= 0) & (ticks < len(left))]] = True
+    return [bool(share >= _MOSTLY) for share in left.reshape(count, _WINDOW_TICKS).mean(axis=1)]
+
+
+def _decoded(run: FaultRun, key: Key, draw: np.random.Generator) -> dict[str, Scalar]:
+    times_s = np.arange(len(run.motion), dtype=np.float64) * SAMPLE_PERIOD_S
+    trajectory = Trajectory("robot0", times_s, run.motion[:, :2], run.motion[:, 2])
+    tracks = capture(MotionCapture(), [trajectory], draw, end_s=SILENT_S)
+    decoding = decode_tracks(tracks, key, DecodeSettings("matched", onset_s=START_S))
+    is_decoded = decoding.verdict == "decoded" and decoding.symbols == _SYMBOLS
+    return {"is_decoded": is_decoded, "p_value": decoding.evidence.p_value}

@@ -1,0 +1,157 @@
+"""Whole messages received: a framed payload from one robot, by its clock, through occlusions and repeats.
+
+One cell is one rollout of four robots, each with a key and a payload of its own under a rolling schedule, of which one
+is read by itself. The recording covers a given number of repetitions and little more, and the auditor knows its time
+to half a minute. A message is received when its tag verifies and its payload is the one that was sent.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hil.experiments.runs.cells import Scalar, Values
+from hil.fleet.lockstep import run_lockstep
+from hil.fleet.recording import motion_capture_tracks
+from hil.fleet.rig import RunSettings
+from hil.plants.mecanum import calibrated_parameters
+from hil.sensors.motion_capture import MotionCapture
+from hil.worlds.robomaster import ROBOTS, fleet_scheme
+from mtm_audit.decoding.frames import Heard, decode_frames
+from mtm_audit.decoding.start import start_of
+from mtm_audit.detectors.base import ChannelReading, Observation
+from mtm_audit.detectors.matched.detector import MatchedDetector
+from mtm_audit.model.glimpse import glimpse_of_track
+from mtm_audit.model.recorded_at import RecordedAt
+from mtm_audit.model.track import Track
+from mtm_onboard.protocol import Channel, Key, Scheme
+from mtm_onboard.protocol.framing import Framing, Payload
+from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
+from mtm_onboard.runtime.message import message_of
+from mtm_onboard.runtime.modulator import Modulator
+
+_STREAM = 6
+_LEAD_S = 1.0
+_TAIL_S = 0.5
+# 2026-01-31 12:00:00 UTC; the run begins within a day of it, drawn from the seed.
+_NOON_UNIX_S = 1_769_860_800.0
+_CLOCK_ERROR_S = 30.0
+_PLAIN, _RANDOM, _SAME = "none", "another half each time", "the same half each time"
+_TEXT_CHARACTERS = "abcdefghijklmnopqrstuvwxyz 0123456789"
+
+
+@dataclass(frozen=True)
+class Job:
+    """What each robot says, and how much of it is recorded: `windows` symbols of an alphabet of 256, `ticks` each.
+
+    `hidden` is which half of every repetition is occluded.
+    """
+
+    name: str
+    framing: Framing
+    windows: int
+    ticks: int
+    repetitions: int
+    hidden: str
+
+    @property
+    def message_s(self) -> float:
+        """Length of one message."""
+        return self.windows * self.ticks / 50.0
+
+
+_NUMBER = Framing("integer", 64, check="tag", check_bits=32, code="reed-solomon", interleave=True)
+_TEXT = Framing("text", 128, check="tag", check_bits=32, code="reed-solomon", interleave=True)
+JOBS: dict[str, Job] = {
+    job.name: job
+    for job in (
+        Job("64 bits in 32 s", _NUMBER, 16, 100, 1, _PLAIN),
+        Job("64 bits in 28 s", _NUMBER, 14, 100, 1, _PLAIN),
+        Job("16 bytes of text in 60 s", _TEXT, 30, 100, 1, _PLAIN),
+        Job("64 bits in 48 s, three times, half hidden", _NUMBER, 24, 100, 3, _RANDOM),
+        Job("64 bits in 48 s, three times, the same half hidden", _NUMBER, 24, 100, 3, _SAME),
+    )
+}
+
+
+def receive(parameters: Values, seed: int) -> dict[str, Scalar]:
+    """Run one rollout and read one of its robots: whether its message was received, and whether a wrong one was."""
+    job = JOBS[str(parameters["job"])]
+    draw = np.random.default_rng([_STREAM, seed])
+    fleet = _fleet_scheme(job)
+    keys = {channel.name: Key("robot", draw.bytes(32), _own_scheme(fleet, channel, job)) for channel in fleet.channels}
+    payloads = {name: _payload(job.framing, draw) for name in keys}
+    unix_s = _NOON_UNIX_S + float(draw.uniform(0.0, 86_400.0))
+    onset_s = slot_start_unix_s(next_slot(unix_s + _LEAD_S, fleet), fleet) - unix_s
+    end_s = onset_s + job.repetitions * job.message_s + _TAIL_S
+    settings = RunSettings(
+        Key("fleet", bytes(32), fleet), _silence(fleet), end_s + 0.1, seed, wire="direct", start_s=_LEAD_S,
+        unix_s=unix_s, plant=calibrated_parameters(),
+        modulator=lambda codebook, name, _: Modulator(
+            keys[name].codebook(codebook.first_slot), name, message_of(payloads[name], keys[name])
+        ),
+    )  # fmt: skip
+    tracks = motion_capture_tracks(run_lockstep(settings), seed, MotionCapture())
+    robot = seed % ROBOTS
+    name = fleet.channels[robot].name
+    seen = _seen(tracks[robot], onset_s, end_s, job, draw)
+    error_s = float(draw.uniform(-_CLOCK_ERROR_S, _CLOCK_ERROR_S))
+    found = _read(seen, keys[name], RecordedAt(unix_s + error_s, _CLOCK_ERROR_S))
+    return {"received": payloads[name] in found, "wrong": any(payload != payloads[name] for payload in found)}
+
+
+def _fleet_scheme(job: Job) -> Scheme:
+    plain = fleet_scheme(job.windows * job.ticks)
+    channels = tuple(replace(channel, symbols=job.windows) for channel in plain.channels)
+    return replace(plain, alphabet_size=256, channels=channels, schedule="rolling")
+
+
+def _own_scheme(fleet: Scheme, channel: Channel, job: Job) -> Scheme:
+    return replace(fleet, channels=(channel,), framing=job.framing)
+
+
+def _silence(fleet: Scheme) -> tuple[int, ...]:
+    """What the rig is told the fleet sends; each robot's own modulator sends something else."""
+    return (0,) * fleet.message_symbols
+
+
+def _payload(framing: Framing, draw: np.random.Generator) -> Payload:
+    if framing.payload == "integer":
+        return int.from_bytes(draw.bytes(framing.payload_bits // 8), "big")
+    letters = draw.choice(list(_TEXT_CHARACTERS), framing.payload_bits // 8)
+    return "".join(letters.tolist())
+
+
+def _seen(track: Track, onset_s: float, end_s: float, job: Job, draw: np.random.Generator) -> Track:
+    """The recording from shortly before the message, with half of each repetition occluded where the job says so."""
+    rows = (track.times_s >= onset_s - _LEAD_S + 0.1) & (track.times_s <= end_s)
+    times_s, positions, valid = track.times_s[rows], track.positions[rows], track.valid[rows].copy()
+    begin = float(draw.random())
+    for repetition in range(job.repetitions if job.hidden != _PLAIN else 0):
+        begin = begin if job.hidden == _SAME else float(draw.random())
+        phase = ((times_s - onset_s) / job.message_s - repetition - begin) % 1.0
+        inside = (times_s >= onset_s + repetition * job.message_s) & (
+            times_s < onset_s + (repetition + 1) * job.message_s
+        )
+        valid &= ~(inside & (phase < 0.5))
+    return replace(
+        track, times_s=times_s, positions=np.where(valid[:, None], positions, np.nan), valid=valid, headings_rad=None
+    )
+
+
+def _read(track: Track, key: Key, at: RecordedAt) -> list[Payload]:
+    """Payloads whose tag verifies."""
+    start = start_of(key.scheme, [track], None, at)
+    (channel,) = key.scheme.channels
+    observations = [Observation(channel, glimpse_of_track(track))]
+    (reading,) = MatchedDetector().read(key.codebook(start.first_slot), [], observations, start.onset)
+    if not isinstance(reading, ChannelReading):
+        return []
+    frames = decode_frames([Heard(channel, reading)], key.scheme, key.secret, start.first_slot, order_known=True)
+    return [
+        frame.message.payload for frame in frames if frame.message.authenticated and frame.message.payload is not None
+    ]
+
+
+def payload_bps(job: Job) -> float:
+    """Payload bits a second of one repetition."""
+    return job.framing.payload_bits / job.message_s

@@ -1,0 +1,96 @@
+"""Cells of a sweep, and the file that keeps what they gave."""
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from mtm_onboard.protocol import MtmError
+
+Scalar = str | int | float | bool
+Values = Mapping[str, Scalar]
+
+_PACKAGES = ("mtm_onboard", "mtm_audit", "hil")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One piece of work: its result is a function of these three and of the code."""
+
+    experiment: str
+    parameters: Values
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """The same text for the same cell, whatever the order of its parameters."""
+        return json.dumps([self.experiment, self.parameters, self.seed], sort_keys=True)
+
+
+@cache
+def code_fingerprint() -> str:
+    """Sixteen hexadecimal digits that differ when any Python file of the project does."""
+    root = Path(__file__).parents[3]
+    digest = hashlib.sha256()
+    for package in _PACKAGES:
+        for path in sorted((root / package).rglob("*.py")):
+            digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+class CellStore:
+    """Finished cells in a text file: one line of JSON each, with the fingerprint of the code that computed it.
+
+    Lines of other code are kept and not used. A line is written in one piece and flushed to the disk, and a last line
+    that an interrupt cut short is dropped when the file is opened again. Raises MtmError when the file cannot be used.
+    """
+
+    def __init__(self, path: Path, code: str | None = None) -> None:
+        self._path = path
+        self._code = code_fingerprint() if code is None else code
+        self._finished: dict[str, Values] = {}
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = path.open("ab+", buffering=0)
+            self._load()
+        except OSError as error:
+            raise MtmError(f"cannot write {path}: {error.strerror}; choose a folder that is writable") from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+    def find(self, cell: Cell) -> Values | None:
+        """The result of a finished cell."""
+        return self._finished.get(cell.name)
+
+    def add(self, cell: Cell, result: Values) -> None:
+        """Keep a result for good."""
+        entry = {"code": self._code, "cell": cell.name, "result": dict(result)}
+        self._file.write(json.dumps(entry).encode() + b"\n")
+        os.fsync(self._file.fileno())
+        self._finished[cell.name] = result
+
+    def _load(self) -> None:
+        self._file.seek(0)
+        text = self._file.read()
+        whole = text[: text.rfind(b"\n") + 1]
+        if len(whole) < len(text):
+            self._file.truncate(len(whole))
+        for number, line in enumerate(whole.splitlines(), 1):
+            try:
+                entry = json.loads(line)
+                if entry["code"] == self._code:
+                    self._finished[entry["cell"]] = entry["result"]
+            except (ValueError, TypeError, KeyError) as error:
+                self._file.close()
+                raise MtmError(f"{self._path}, line {number}, is no finished cell; remove the file") from error

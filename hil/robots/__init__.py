@@ -1,1 +1,0 @@
-"""Simulators that speak the real protocols and plug in where the hardware would."""

@@ -1,0 +1,24 @@
+"""A plaintext line inside one process, for simulations that run faster than real time."""
+
+import socket
+
+from hil.wires.plaintext_ports import LinePort
+from mtm_onboard.links.byte_link import ByteLink
+from mtm_onboard.links.robomaster_plaintext import RoboMasterPlaintext
+
+
+class LineTransport(RoboMasterPlaintext):
+    """A RoboMaster EP at the far end of `link`, which serves for one `open` and is closed by `close`."""
+
+    def __init__(self, link: ByteLink) -> None:
+        super().__init__()
+        self._given_link = link
+
+    def _connect(self) -> ByteLink:
+        return self._given_link
+
+
+def plaintext_line() -> tuple[LineTransport, LinePort]:
+    """Both ends of a new line; what one sends is there for the other at once."""
+    ours, theirs = socket.socketpair()
+    return LineTransport(ByteLink(ours.detach())), LinePort(theirs.detach())

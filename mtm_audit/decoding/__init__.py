@@ -1,0 +1,1 @@
+"""From tracks to a decoding: association, start, symbols, message, verdict."""

@@ -1,0 +1,1 @@
+"""Any recording into tracks: which reader and which tracker it takes."""

@@ -1,0 +1,42 @@
+"""Any recording into tracks."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from mtm_audit.model.track import Track
+from mtm_audit.readers.motion_capture import read_motion_capture
+from mtm_audit.readers.text import check_readable
+from mtm_audit.readers.video import read_frames
+from mtm_audit.tracking.registry import tracker
+
+VIDEO_SUFFIXES = frozenset({".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts"})
+
+
+def is_video(path: Path) -> bool:
+    """By its suffix, or else by its content: text is motion capture, anything else is video.
+
+    Raises MtmError when the file is missing, empty or a folder.
+    """
+    check_readable(path)
+    if path.suffix.lower() in VIDEO_SUFFIXES:
+        return True
+    with path.open("rb") as file:
+        start = file.read(4096)
+    return b"\0" in start
+
+
+def load_tracks(
+    path: Path,
+    tracker_name: str = "aruco",
+    warn: Callable[[str], None] | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> list[Track]:
+    """Read one recording: a video through the named tracker, or a motion-capture file as it is.
+
+    `warn` receives one sentence for each thing that is wrong but leaves something to use; `progress` the number of
+    frames tracked so far. Raises MtmError when the recording cannot be used.
+    """
+    if not is_video(path):
+        return [read_motion_capture(path)]
+    chosen = tracker(tracker_name)
+    return chosen.track(read_frames(path, chosen.pixels, warn), progress)

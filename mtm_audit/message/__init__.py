@@ -1,5 +1,0 @@
-"""From log-likelihood ratios of symbols to a framed message."""
-
-from mtm_audit.message.message import Message, decode_message
-
-__all__ = ["Message", "decode_message"]

@@ -1,0 +1,1 @@
+"""Files into pictures or tracks; a reader knows nothing of tracking."""

@@ -1,1 +1,0 @@
-"""Reading recordings: video into frames, motion capture into tracks."""

@@ -1,0 +1,1 @@
+"""A decoding in words, in JSON and in pictures."""

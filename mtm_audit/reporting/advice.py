@@ -1,0 +1,108 @@
+"""What would help when a recording did not say everything."""
+
+import math
+
+from mtm_audit.decoding.decode import CERTAIN, MORE_DECOYS, NEARLY, Decoding
+from mtm_audit.model.recording import Recording
+from mtm_onboard.protocol.framing import payload_bits
+
+_LONGEST_FACTOR = 10.0
+
+
+def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
+    """Sentences for a decode that is not "decoded": what is uncertain and what to try; nothing otherwise."""
+    if decoding.verdict == "decoded":
+        return ()
+    if decoding.verdict == "absent":
+        return (
+            "Either nobody sent one, or it was sent with another key, or the recording is too short or too coarse to "
+            "show it.",
+            *_of_the_nearly_found(decoding),
+        )
+    if decoding.scheme.framing is not None:
+        return (_of_the_frame(decoding),)
+    if not decoding.uncertain and not decoding.order_known:
+        return (
+            "The message repeats, and nothing shows which of its symbols comes first; give --onset when it is known "
+            "when the robot began, or send with a key whose schedule is rolling.",
+        )
+    if not decoding.uncertain:
+        spelled = ", ".join(str(symbol) for symbol in decoding.symbols)
+        return (
+            f"The symbols {spelled} are certain, but they spell none of the numbers 0 to "
+            f"{(1 << payload_bits(decoding.scheme)) - 1}; the robot was perhaps given symbols instead of a number.",
+        )
+    return tuple(_of_the_uncertain(recording, decoding))
+
+
+def _of_the_nearly_found(decoding: Decoding) -> tuple[str, ...]:
+    """A tail known from few decoys is taken for heavy, so that more of them may show the same evidence to be rare."""
+    if decoding.evidence.p_value > NEARLY:
+        return ()
+    decoys = MORE_DECOYS * len(decoding.evidence.decoy_strengths)
+    return (
+        f"Chance seldom comes so near, though: do not take it for absent before more decoy keys (--decoys {decoys}) or "
+        "a longer recording have said so too.",
+    )
+
+
+def _of_the_frame(decoding: Decoding) -> str:
+    unseen = sum(symbol is None for symbol in decoding.symbols)
+    doubtful = len(decoding.uncertain) - unseen
+    seen = f"{unseen} of {len(decoding.symbols)} symbols were not seen and {doubtful} are less than {CERTAIN:.0%} sure"
+    when = " Check --at as well: a frame's check holds in its own day alone." if decoding.settings.at else ""
+    return f"What was read is no frame of this key whose check holds: {seen}; record more repetitions of it.{when}"
+
+
+def _of_the_uncertain(recording: Recording, decoding: Decoding) -> list[str]:
+    sentences = []
+    unseen = [place for place in decoding.uncertain if decoding.symbols[place] is None]
+    doubtful = [place for place in decoding.uncertain if decoding.symbols[place] is not None]
+    if unseen:
+        bodies = sorted({body for place in unseen for body in _bodies(decoding, place)})
+        sentences.append(
+            f"Not seen: {_places(unseen)}, which {_listed(bodies)} sends; record that robot too, or name its track "
+            "with --assign."
+        )
+    if doubtful:
+        sentences.append(
+            f"Uncertain: {_places(doubtful)} (less than {CERTAIN:.0%} sure); {_longer(recording, decoding, doubtful)}"
+        )
+    return sentences
+
+
+def _longer(recording: Recording, decoding: Decoding, doubtful: list[int]) -> str:
+    """How much recording would settle it: log-odds grow in proportion to the number of repeats."""
+    needed = math.log(CERTAIN / (1.0 - CERTAIN))
+    factor = max(needed / max(_log_odds(decoding, place), needed / 100.0) for place in doubtful)
+    message_s = decoding.scheme.message_ticks / decoding.scheme.rate_hz
+    if factor > _LONGEST_FACTOR:
+        return (
+            f"even {_LONGEST_FACTOR:g} times this recording would hardly settle it; come closer, or check that the "
+            "robot plays the message."
+        )
+    wanted_s = math.ceil(max(recording.duration_s, message_s) * factor / message_s) * message_s
+    wanted_s = max(wanted_s, (math.floor(recording.duration_s / message_s) + 1) * message_s)
+    return f"a recording of roughly {wanted_s:.0f} s in which the message repeats should settle it."
+
+
+def _log_odds(decoding: Decoding, place: int) -> float:
+    """Of the best symbol against all others."""
+    posterior = float(decoding.posteriors[place].max())
+    return math.log(max(posterior, 1e-12) / max(1.0 - posterior, 1e-12))
+
+
+def _bodies(decoding: Decoding, place: int) -> list[str]:
+    scheme = decoding.scheme
+    if scheme.combine == "same":
+        return [channel.body for channel in scheme.channels]
+    owners = [channel.body for channel in scheme.channels for _ in range(channel.symbols)]
+    return [owners[place]]
+
+
+def _places(places: list[int]) -> str:
+    return ("symbol " if len(places) == 1 else "symbols ") + _listed([str(place) for place in places])
+
+
+def _listed(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -1,0 +1,70 @@
+"""A framed message in words: what it says, and what its check does and does not prove."""
+
+from datetime import UTC, datetime
+
+from mtm_audit.decoding.decode import Decoding
+from mtm_audit.decoding.frames import Delivered
+from mtm_onboard.protocol.framing import Payload
+from mtm_onboard.protocol.slots import slot_start_unix_s
+
+
+def payload_text(payload: Payload) -> str:
+    """The payload as a reader sees it: a number, hexadecimal bytes, or text in quotes."""
+    if isinstance(payload, bytes):
+        return f"bytes {payload.hex(' ')}"
+    return f'text "{payload}"' if isinstance(payload, str) else f"message {payload}"
+
+
+def frame_sentences(decoding: Decoding) -> tuple[str, ...]:
+    """What was delivered when, and what follows from its check; nothing for plain messages or without a message."""
+    if decoding.verdict != "decoded" or not decoding.frames:
+        return ()
+    earlier = [
+        f"Before it: {_said(frame)}, from {frame.start_s:.1f} to {frame.end_s:.1f} s."
+        for frame in decoding.frames[:-1]
+        if frame.message.payload is not None
+    ]
+    return (*earlier, proof_sentence(decoding))
+
+
+def proof_sentence(decoding: Decoding) -> str:
+    """What the last message's check proves, and what not."""
+    message = decoding.frames[-1].message
+    chance = f"a wrong message passes with a probability below {message.false_acceptance:.1g}"
+    if message.check == "none":
+        return f"No check: the frame is the likeliest one, with probability {message.posterior:.4f}."
+    if message.check == "crc":
+        return f"Its {message.check_bits}-bit CRC holds ({chance}). It shows no more than that nothing was misread."
+    proof = f"Authenticated: its {message.check_bits}-bit tag holds ({chance}), so whoever made this motion had the key"
+    if decoding.scheme.schedule == "rolling":
+        return (
+            f"{proof}, and made it for the time slot that began at {slot_time(decoding)}. It does not prove who held "
+            "the key, nor that the recording's time is right."
+        )
+    return (
+        f"{proof}. It does not prove who held the key, nor when: under a fixed schedule an old motion played again "
+        "looks the same."
+    )
+
+
+def slot_time(decoding: Decoding) -> str:
+    """When the last message's first slot began, in UTC."""
+    unix_s = slot_start_unix_s(decoding.frames[-1].slots[0], decoding.scheme)
+    return datetime.fromtimestamp(unix_s, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+
+
+def clock_sentence(decoding: Decoding) -> str | None:
+    """How far the recording's clock was from the robot's; None under the fixed schedule or without a message."""
+    at, scheme = decoding.settings.at, decoding.scheme
+    onsets_s = [item.reading.timing.onset_s for item in decoding.channels if item.reading is not None]
+    if scheme.schedule == "fixed" or at is None or decoding.verdict == "absent":
+        return None
+    nominal_s = slot_start_unix_s(decoding.start.first_slot, scheme) - at.unix_s
+    off_s = sorted(onset_s - nominal_s for onset_s in onsets_s)[len(onsets_s) // 2]
+    way = "behind" if off_s < 0.0 else "ahead of"
+    return f"By the robot's clock the recording's time, as given, is {abs(off_s):.2f} s {way} UTC."
+
+
+def _said(frame: Delivered) -> str:
+    payload = frame.message.payload
+    return "nothing" if payload is None else payload_text(payload)

@@ -1,0 +1,99 @@
+"""The decode as JSON, for programs; docs/decode-json.md describes it and decode.schema.json checks it."""
+
+import json
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from mtm_audit.decoding.decode import CERTAIN, ChannelDecoding, Decoding
+from mtm_audit.decoding.frames import Delivered
+from mtm_audit.model.recording import Recording
+from mtm_audit.reporting.text import message_bits
+from mtm_onboard.protocol.slots import slot_start_unix_s
+
+SCHEMA_VERSION = 1
+
+
+def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, ...]) -> str:
+    """The whole answer as one JSON object with a newline at its end; numbers are finite, nothing in it is secret."""
+    evidence, scheme = decoding.evidence, decoding.scheme
+    report = {
+        "schema_version": SCHEMA_VERSION,
+        "program": {"name": "mtm-audit", "version": version("mtm")},
+        "verdict": decoding.verdict,
+        "message": decoding.message.hex() if isinstance(decoding.message, bytes) else decoding.message,
+        "message_bits": message_bits(decoding),
+        "frames": [_frame(frame, decoding) for frame in decoding.frames if frame.message.payload is not None],
+        "symbols": _symbols(decoding),
+        "p_value": evidence.p_value,
+        "threshold": decoding.settings.threshold,
+        "strength": evidence.strength,
+        "evidence_bits": decoding.evidence_bits,
+        "decoys": {
+            "count": len(evidence.decoy_strengths),
+            "mean": float(np.mean(evidence.decoy_strengths)),
+            "sd": float(np.std(evidence.decoy_strengths, ddof=1)),
+        },
+        "key_id": decoding.key_id,
+        "scheme": {"name": scheme.name, "fingerprint": scheme.fingerprint},
+        "detector": decoding.settings.detector,
+        "channels": [_channel(channel) for channel in decoding.channels],
+        "recording": {
+            "paths": [str(path) for path in recording.paths],
+            "kind": recording.kind,
+            "duration_s": recording.duration_s,
+            "frames": recording.frames,
+        },
+        "warnings": list(warnings),
+    }
+    return json.dumps(report, indent=2, allow_nan=False) + "\n"
+
+
+def _frame(frame: Delivered, decoding: Decoding) -> dict[str, Any]:
+    """One framed message; bytes are written as hexadecimal digits."""
+    message, framing = frame.message, decoding.scheme.framing
+    rolling = decoding.scheme.schedule == "rolling"
+    return {
+        "payload_kind": None if framing is None else framing.payload,
+        "payload": message.payload.hex() if isinstance(message.payload, bytes) else message.payload,
+        "number": message.number,
+        "check": message.check,
+        "check_bits": message.check_bits,
+        "check_passed": message.check_passed,
+        "authenticated": message.authenticated,
+        "false_acceptance": message.false_acceptance,
+        "posterior": message.posterior,
+        "epoch": message.epoch,
+        "slot_start_unix_s": slot_start_unix_s(frame.slots[0], decoding.scheme) if rolling else None,
+        "start_s": frame.start_s,
+        "end_s": frame.end_s,
+    }
+
+
+def _symbols(decoding: Decoding) -> list[dict[str, Any]]:
+    """Empty when no message is there: symbols of chance must not look like one."""
+    if decoding.verdict == "absent":
+        return []
+    posteriors = [
+        None if symbol is None else float(decoding.posteriors[place, symbol])
+        for place, symbol in enumerate(decoding.symbols)
+    ]
+    return [
+        {"symbol": symbol, "posterior": posterior, "certain": posterior is not None and posterior >= CERTAIN}
+        for symbol, posterior in zip(decoding.symbols, posteriors, strict=True)
+    ]
+
+
+def _channel(decoding: ChannelDecoding) -> dict[str, Any]:
+    channel, glimpse, reading = decoding.channel, decoding.glimpse, decoding.reading
+    return {
+        "name": channel.name,
+        "body": channel.body,
+        "track": None if glimpse is None else glimpse.name,
+        "track_searched": decoding.searched,
+        "onset_s": decoding.onset_s,
+        "rate_hz": None if reading is None else reading.timing.rate_hz,
+        "windows": 0 if reading is None else len(reading.window_positions),
+        "scores": None if reading is None else reading.scores.tolist(),
+    }

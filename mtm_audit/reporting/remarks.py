@@ -1,0 +1,59 @@
+"""What a person should know beside the verdict: where recording, scheme and reading do not fit together."""
+
+import numpy as np
+
+from mtm_audit.decoding.decode import ChannelDecoding, Decoding
+from mtm_audit.model.recording import Recording
+
+_RATE_TOLERANCE = 0.02
+_GAP_SHARE = 0.2
+
+
+def remarks(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
+    """One sentence for each thing that does not fit, the recording's own warnings first."""
+    found = [*recording.warnings, *_of_the_recording(recording, decoding)]
+    for channel in decoding.channels:
+        found += _of_a_channel(channel, decoding)
+    return tuple(found)
+
+
+def _of_the_recording(recording: Recording, decoding: Decoding) -> list[str]:
+    scheme, found = decoding.scheme, []
+    message_s = scheme.message_ticks / scheme.rate_hz
+    if recording.duration_s < message_s:
+        found.append(
+            f"the recording lasts {recording.duration_s:.1f} s and one message {message_s:g} s, so part of it is "
+            "missing; record longer"
+        )
+    needed_hz, rate_hz = 2.0 * scheme.band_hz[1], recording.frame_rate_hz
+    if rate_hz is not None and rate_hz < needed_hz:
+        found.append(
+            f"{rate_hz:.1f} observations a second are too few for a band up to {scheme.band_hz[1]:g} Hz; record with "
+            f"at least {needed_hz:g}"
+        )
+    if decoding.verdict != "absent" and not decoding.order_known and decoding.message is None:
+        found.append("the message repeats, and nothing shows which of its symbols comes first; give --onset")
+    return found
+
+
+def _of_a_channel(decoding: ChannelDecoding, whole: Decoding) -> list[str]:
+    channel, glimpse, reading = decoding.channel, decoding.glimpse, decoding.reading
+    if glimpse is None:
+        return [f"no track shows {channel.body}, so channel {channel.name} was not read; film it, or use --assign"]
+    found = []
+    # Gaps are few and long, ordinary intervals many and short, so time and not count says how much was missed.
+    missed = float(np.sum(glimpse.durations_s[~glimpse.valid]) / np.sum(glimpse.durations_s))
+    if missed > _GAP_SHARE:
+        found.append(
+            f"{channel.body} was out of sight for {missed:.0%} of the time between its first and last sighting"
+        )
+    if reading is None:
+        return [*found, f"track {glimpse.name} is too short to read channel {channel.name}; record longer"]
+    nominal_hz = whole.scheme.rate_hz
+    # Without a message the rate found is that of chance.
+    if whole.verdict != "absent" and abs(reading.timing.rate_hz / nominal_hz - 1.0) > _RATE_TOLERANCE:
+        found.append(
+            f"channel {channel.name} seems to run at {reading.timing.rate_hz:.2f} Hz instead of {nominal_hz:g} Hz; "
+            "check the recording's time stamps and the robot's clock"
+        )
+    return found

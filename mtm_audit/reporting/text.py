@@ -1,0 +1,203 @@
+"""The decode as a person reads it: verdict first, then what it rests on."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from rich.console import Console, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from mtm_audit.decoding.decode import CERTAIN, ChannelDecoding, Decoding
+from mtm_audit.model.recording import Recording
+from mtm_audit.reporting.advice import advice
+from mtm_audit.reporting.delivery import clock_sentence, frame_sentences, payload_text
+from mtm_onboard.protocol.framing import payload_bits
+
+_COLOURS = {"decoded": "bold green", "absent": "bold red", "inconclusive": "bold yellow"}
+
+
+def print_report(console: Console, recording: Recording, decoding: Decoding, warnings: Sequence[str]) -> None:
+    """Print verdict, evidence, channels and warnings."""
+    console.print(_report(recording, decoding, warnings), highlight=False)
+
+
+def verdict_sentence(decoding: Decoding) -> str:
+    """The verdict in one line."""
+    if decoding.verdict == "decoded" and decoding.message is not None:
+        bits = message_bits(decoding)
+        return f"decoded: {payload_text(decoding.message)}" + (f" ({bits})" if bits else "")
+    if decoding.verdict == "absent":
+        return f"absent: no message of key {decoding.key_id} was found in this recording"
+    return "inconclusive: a message of this key is there, but not all of it could be read"
+
+
+def message_bits(decoding: Decoding) -> str | None:
+    """The message as a binary number with all its digits, `0b...`; None unless decoded, and a number."""
+    framing, message = decoding.scheme.framing, decoding.message
+    if not isinstance(message, int):
+        return None
+    return f"0b{message:0{framing.payload_bits if framing else payload_bits(decoding.scheme)}b}"
+
+
+def chance_sentence(decoding: Decoding) -> str:
+    """The p-value in words, and what it is estimated from."""
+    evidence, decoys = decoding.evidence, len(decoding.evidence.decoy_strengths)
+    basis = f"judged by {decoys} decoy keys"
+    if evidence.p_value < 1.0 / decoys:
+        basis = f"extrapolated from {decoys} decoy keys"
+    return (
+        f"About {rarity(evidence.p_value)} recordings without a message of this key would look like this, {basis}; "
+        f"the limit is {rarity(decoding.settings.threshold)}."
+    )
+
+
+def evidence_sentence(decoding: Decoding) -> str:
+    """The evidence in bits, and what that means."""
+    meaning = "log-likelihood ratio of the best message against none" if decoding.evidence.in_nats else "-log2 p"
+    return f"{decoding.evidence_bits:.1f} bits of evidence for a message of this key ({meaning})"
+
+
+def search_sentence(recording: Recording, decoding: Decoding) -> str | None:
+    """Which tracks were matched by search; None when all were named. Without a message the pairs are chance."""
+    found = {item.channel.body: item.glimpse.name for item in decoding.channels if item.searched and item.glimpse}
+    if not found:
+        return None
+    among = f"among {len(recording.tracks)} tracks, as were those of the decoy keys"
+    if decoding.verdict == "absent":
+        return f"Which track shows {', '.join(found)} was searched {among}; without a message the pairs are chance."
+    pairs = ", ".join(f"{body} is {track}" for body, track in found.items())
+    return f"Tracks matched by search {among}: {pairs}."
+
+
+def rarity(probability: float) -> str:
+    """A probability as "43 in 100", "1 in 2,500" or "1 in 3e14"."""
+    if probability >= 0.01:
+        return f"{100.0 * probability:.0f} in 100"
+    if probability <= 0.0:
+        return "0 in 100"
+    odds = 1.0 / probability
+    return f"1 in {odds:,.0f}" if odds < 1e7 else f"1 in {odds:.0e}".replace("e+", "e")
+
+
+def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str]) -> RenderableType:
+    scheme = decoding.scheme
+    parts: list[RenderableType] = [
+        Text(verdict_sentence(decoding), style=_COLOURS[decoding.verdict]),
+        Text(chance_sentence(decoding)),
+        *(
+            Text(sentence)
+            for sentence in (
+                *frame_sentences(decoding),
+                clock_sentence(decoding),
+                search_sentence(recording, decoding),
+                *advice(recording, decoding),
+            )
+            if sentence
+        ),
+        Text(""),
+        Text(f"key        {decoding.key_id}"),
+        Text(f"scheme     {scheme.name} (fingerprint {scheme.fingerprint})"),
+        Text(f"recording  {recording_line(recording)}"),
+        Text(f"evidence   {evidence_sentence(decoding)}"),
+        *(Text(line) for line in [_frame_line(decoding)] if line),
+        Text(""),
+        _table_of(decoding),
+    ]
+    parts += [Text(f"warning: {warning}", style="yellow") for warning in warnings]
+    return Group(*parts)
+
+
+def recording_line(recording: Recording) -> str:
+    """Kind, length and bodies of the recording in one line."""
+    rate_hz = recording.frame_rate_hz
+    rate = "" if rate_hz is None else f" at {rate_hz:.4g} a second"
+    what = "frames" if recording.kind == "video" else "samples"
+    names = ", ".join(track.name for track in recording.tracks)
+    return f"{recording.kind}, {recording.duration_s:.1f} s, {recording.frames} {what}{rate}, tracks: {names}"
+
+
+def _table_of(decoding: Decoding) -> Table:
+    if decoding.verdict == "absent":
+        return _absent_table(decoding)
+    return _symbol_table(decoding) if decoding.scheme.framing is None else _frame_table(decoding)
+
+
+def _frame_table(decoding: Decoding) -> Table:
+    """Channels with their windows; a frame's symbols may be dealt over all of them."""
+    table = _table("channel", "track", "start s", "rate Hz", "windows", "margin")
+    for channel in decoding.channels:
+        reading, head = channel.reading, [channel.channel.name, _track_name(channel)]
+        if reading is None:
+            table.add_row(*head, "-", "-", "0", "-")
+            continue
+        ranked = np.sort(reading.window_scores, axis=1)
+        margin = float(np.median(ranked[:, -1] - ranked[:, -2]))
+        starts = [f"{channel.onset_s:.2f}", f"{reading.timing.rate_hz:.2f}"]
+        table.add_row(*head, *starts, str(len(ranked)), _score(margin))
+    return table
+
+
+def _frame_line(decoding: Decoding) -> str | None:
+    """How many of a frame's symbols were seen, and are sure; None without a frame."""
+    if not decoding.frames:
+        return None
+    count, unseen = len(decoding.symbols), sum(symbol is None for symbol in decoding.symbols)
+    return f"frame      {count - len(decoding.uncertain)} of {count} symbols are sure, {unseen} were not seen"
+
+
+def _symbol_table(decoding: Decoding) -> Table:
+    table = _table("channel", "track", "start s", "rate Hz", "windows", "symbol", "sure", "best", "next", "margin")
+    for channel in decoding.channels:
+        first = decoding.scheme.first_position(channel.channel)
+        reading, head = channel.reading, [channel.channel.name, _track_name(channel)]
+        if reading is None:
+            table.add_row(*head, "-", "-", "0", "-", "-", "-", "-", "-")
+            continue
+        head += [f"{channel.onset_s:.2f}", f"{reading.timing.rate_hz:.2f}"]
+        for position in range(channel.channel.symbols):
+            windows = int(np.sum(reading.window_positions == position))
+            symbol = decoding.symbols[first + position]
+            posterior = 0.0 if symbol is None else float(decoding.posteriors[first + position, symbol])
+            best, runner_up = (float(score) for score in np.sort(reading.scores[position])[:-3:-1])
+            doubt = "" if posterior >= CERTAIN else " ?"
+            table.add_row(
+                *(head if position == 0 else [""] * len(head)),
+                str(windows), f"{symbol}{doubt}", percent(posterior),
+                _score(best), _score(runner_up), _score(best - runner_up),
+            )  # fmt: skip
+    return table
+
+
+def _absent_table(decoding: Decoding) -> Table:
+    """Without symbols: those of a recording without a message would be chance, and would look like one."""
+    table = _table("channel", "track", "windows", "this key", "decoy keys")
+    for channel in decoding.channels:
+        windows = 0 if channel.reading is None else len(channel.reading.window_positions)
+        strength = "-" if channel.reading is None else _score(channel.reading.strength)
+        table.add_row(channel.channel.name, _track_name(channel), str(windows), strength, "")
+    evidence = decoding.evidence
+    mean, spread = float(np.mean(evidence.decoy_strengths)), float(np.std(evidence.decoy_strengths, ddof=1))
+    table.add_section()
+    table.add_row("together", "", "", _score(evidence.strength), f"{_score(mean)} ± {_score(spread)}")
+    return table
+
+
+def percent(probability: float) -> str:
+    """A posterior for reading: never rounded up to certainty."""
+    return "> 99.9 %" if probability > 0.999 else f"{100.0 * probability:.1f} %"
+
+
+def _score(score: float) -> str:
+    """Coherencies lie below one, log-likelihood ratios in the hundreds."""
+    return f"{score:.3f}" if abs(score) < 10.0 else f"{score:.1f}"
+
+
+def _track_name(channel: ChannelDecoding) -> str:
+    return "-" if channel.glimpse is None else channel.glimpse.name
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
+    for number, column in enumerate(columns):
+        table.add_column(column, justify="left" if number < 2 else "right", no_wrap=True)
+    return table

@@ -1,0 +1,1 @@
+"""What scores are worth: how often chance alone would show as much."""

@@ -1,0 +1,1 @@
+"""A running session and what an operator may ask of it."""

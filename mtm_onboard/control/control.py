@@ -1,0 +1,155 @@
+"""What an operator may ask of a running robot: another message or none, how it fares, and the stop.
+
+Requests and answers are tables, one JSON line each on the control socket:
+
+    {"command": "send", "content": {"number": 7}}    or {"text": "..."}, {"hex": "..."}, {"symbols": [...]}
+    {"command": "silence"}
+    {"command": "status"}
+    {"command": "stop"}
+"""
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mtm_onboard.journal.journal import Journal
+from mtm_onboard.links.base import Transport
+from mtm_onboard.protocol import Key, MtmError
+from mtm_onboard.runtime.guard import Guard
+from mtm_onboard.runtime.loop import LoopStats
+from mtm_onboard.runtime.message import SILENCE, Played, Silence, content_from_table, message_of
+from mtm_onboard.runtime.modulator import Modulator
+from mtm_onboard.runtime.source import Source
+
+Table = dict[str, Any]
+
+# The loop takes up a message in its next tick; after this it is held up by something.
+_PATIENCE_S = 2.0
+
+
+@dataclass(frozen=True)
+class Session:
+    """The parts of a run that can be asked or told something.
+
+    `tick` says which one is under way; tick 0 is at `start_unix_s`, and under the rolling schedule slot `first_slot`
+    begins there.
+    """
+
+    robot: str
+    key: Key
+    modulator: Modulator
+    guard: Guard
+    source: Source
+    transport: Transport
+    stats: LoopStats
+    journal: Journal | None
+    tick: Callable[[], int]
+    start_unix_s: float
+    first_slot: int
+
+
+class Control:
+    """Answers requests; `answer` may be called from several threads at once, and the loop waits for none of them."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._one_message_at_a_time = threading.Lock()
+        self._messages = 1
+        self._answers: dict[str, Callable[[Table], Table]] = {
+            "send": self._send, "silence": self._silence, "status": self._status, "stop": self._stop,
+        }  # fmt: skip
+
+    def answer(self, request: Table) -> Table:
+        """The answer to one request; raises MtmError when it cannot be done."""
+        command = request.get("command")
+        if not isinstance(command, str) or command not in self._answers:
+            raise MtmError(f"the command {command!r} is unknown; choose one of: {', '.join(self._answers)}")
+        known = {"command", "content"} if command == "send" else {"command"}
+        unknown = sorted(request.keys() - known)
+        if unknown:
+            raise MtmError(f"the request has an unknown field {unknown[0]!r}; remove it")
+        return self._answers[command](request)
+
+    def _send(self, request: Table) -> Table:
+        content = request.get("content")
+        if not isinstance(content, dict):
+            raise MtmError("the request has no content; give a number, text, hex or symbols")
+        with self._one_message_at_a_time:
+            message = message_of(content_from_table(content), self._session.key, self._messages)
+            answer = self._queue(message, f"message {message.number} begins here, {_words(content)}")
+            self._messages += 1
+        return answer | {"number": message.number}
+
+    def _silence(self, _: Table) -> Table:
+        with self._one_message_at_a_time:
+            return self._queue(SILENCE, "silence begins here")
+
+    def _queue(self, played: Played, note: str) -> Table:
+        modulator = self._session.modulator
+        queued = modulator.queue(played)
+        tick = queued.start_tick(_PATIENCE_S)
+        if tick is None and not modulator.withdraw(queued):
+            # It was taken up at this very moment.
+            tick = queued.start_tick(_PATIENCE_S)
+        if tick is None:
+            raise MtmError("the robot's loop stands still and took up nothing; see its status and its link")
+        replaced = _name(queued.replaced)
+        instead = "" if replaced is None else f", in the place of {called(replaced)}, which never began"
+        self._note(tick, note + instead)
+        return self._when(tick) | {"replaces": replaced}
+
+    def _status(self, _: Table) -> Table:
+        session = self._session
+        guard, stats, modulator, journal = session.guard, session.stats, session.modulator, session.journal
+        tick = session.tick()
+        return {
+            "robot": session.robot,
+            "key": session.key.id,
+            "scheme": session.key.scheme.fingerprint,
+            "tick": tick,
+            "sent": stats.sent,
+            "missed": stats.missed,
+            "overruns": stats.overruns,
+            "clamped": guard.clamped,
+            "stale": guard.stale,
+            "held": guard.held,
+            "unsent": guard.unsent,
+            "refused": session.source.refused + guard.refused,
+            "late_p99_ms": round(1e3 * stats.lateness.quantile_s(0.99), 3),
+            "stopped": guard.stopped,
+            "message": _name(modulator.message),
+            "waiting": _name(modulator.waiting),
+            "silent": not modulator.sends(tick),
+            "journal_lost": None if journal is None else journal.lost,
+            "link": session.transport.health(),
+        }
+
+    def _stop(self, _: Table) -> Table:
+        self._session.guard.stop()
+        self._note(self._session.tick(), "stop over the control socket")
+        return {"stopped": True}
+
+    def _when(self, tick: int) -> Table:
+        session, scheme = self._session, self._session.key.scheme
+        slot = session.first_slot + tick // scheme.message_ticks if scheme.schedule == "rolling" else None
+        return {"tick": tick, "unix_s": session.start_unix_s + tick / scheme.rate_hz, "slot": slot}
+
+    def _note(self, tick: int, text: str) -> None:
+        if self._session.journal is not None:
+            self._session.journal.note(tick, text)
+
+
+def called(name: int | str) -> str:
+    """What an answer names, a message's number or "silence", in words."""
+    return name if isinstance(name, str) else f"message {name}"
+
+
+def _name(played: Played | None) -> int | str | None:
+    if isinstance(played, Silence):
+        return "silence"
+    return None if played is None or isinstance(played, Sequence) else played.number
+
+
+def _words(content: Table) -> str:
+    return ", ".join(f"{kind} {value}" for kind, value in content.items())

@@ -1,0 +1,201 @@
+"""One run of a robot in real time: everything put together, from opening its link to its last stop."""
+
+import gc
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from mtm_onboard.control.control import Control, Session
+from mtm_onboard.control.control_socket import ControlSocket
+from mtm_onboard.control.service_manager import ServiceManager
+from mtm_onboard.journal.journal import Journal, JournalHeader
+from mtm_onboard.links.base import Transport
+from mtm_onboard.links.factory import make_transport
+from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.model.clock import Clock, SystemClock
+from mtm_onboard.protocol import Key, MtmError, Scheme
+from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
+from mtm_onboard.runtime.config import RobotConfig, SourceSettings
+from mtm_onboard.runtime.guard import Guard
+from mtm_onboard.runtime.loop import LoopStats, run_loop
+from mtm_onboard.runtime.message import SILENCE, Content, message_of
+from mtm_onboard.runtime.modulator import Modulator
+from mtm_onboard.runtime.realtime import realtime
+from mtm_onboard.runtime.service import ServiceThread
+from mtm_onboard.runtime.source import Source, StdinSource, UdpSource
+from mtm_onboard.runtime.tick import Runtime
+
+# Between opening the link and the message's first tick, so that the loop is running by then.
+_LEAD_S = 0.1
+# The year 2024: a clock that shows less was never set since the power came on.
+_EARLIEST_UNIX_S = 1_704_067_200.0
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to send and when: the message, from `start_unix_s` (None: at once) on.
+
+    Without a message there is silence until the run is sent one. Under the rolling schedule the start is the next
+    slot's. The run ends `duration_s` after the message's start;
+    without `repeat` the message is sent once.
+    """
+
+    message: Content | None
+    repeat: bool = True
+    start_unix_s: float | None = None
+    duration_s: float = math.inf
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Where base commands come from and where commands go, when the caller has both already."""
+
+    source: Source
+    transport: Transport
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the run did. `journal` is None when none was kept."""
+
+    stats: LoopStats
+    guard: Guard
+    source: Source
+    journal: Journal | None
+    link_losses: int = 0
+
+    def summary(self) -> str:
+        """All of it in one line."""
+        guard, late_ms = self.guard, [1e3 * self.stats.lateness.quantile_s(part) for part in (0.5, 0.99)]
+        kept = f", journal {self.journal.path}, {self.journal.lost} rows lost" if self.journal else ""
+        return (
+            f"{self.stats.sent} ticks sent, {self.stats.missed} missed, {self.stats.overruns} over their period, "
+            f"{guard.clamped} clamped, {guard.stale} stale, {self.link_losses} link losses, "
+            f"{self.source.refused + guard.refused} commands refused, "
+            f"late p50 {late_ms[0]:.3f} ms p99 {late_ms[1]:.3f} ms{kept}"
+        )
+
+
+def run_session(
+    config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callable[[], bool], ends: Ends | None = None
+) -> Outcome:
+    """Drive the robot until `asked_to_end()` or the plan's end; leaving it, in whatever way, stops the robot.
+
+    `ends`, when given, take the place of the source and the transport that the configuration names.
+    Raises MtmError when the plan does not fit the key, when the link, the control socket or the journal cannot be had,
+    and when the link fails.
+    """
+    channel, rate_hz = key.scheme.channel(config.robot.channel), key.scheme.rate_hz
+    rolling = key.scheme.schedule == "rolling"
+    # Before anything moves, so that whatever does not fit is found; a rolling message then gets its true slot.
+    modulator = _modulator(key, channel.name, plan, 0)
+    if rolling:
+        _check_clock(time.time())
+    guard = Guard(config.limits, config.staleness, noise_sigma=channel.sigma, period_s=1 / rate_hz)
+    clock, stats = SystemClock(), LoopStats()
+    transport = _link(config, clock) if ends is None else ends.transport
+    # The stack closes in reverse: the robot is told to stop before a socket or a slow disk is waited for.
+    with ExitStack() as stack:
+        source = _source(config.source) if ends is None else ends.source
+        stack.callback(source.close)
+        files = stack.enter_context(ExitStack())
+        socket = None if config.control is None else files.enter_context(ControlSocket(Path(config.control.socket)))
+        stack.enter_context(transport)
+        service = stack.enter_context(ServiceThread(transport, clock))
+        # Before the service's thread is waited for, which a wedged driver may hold.
+        stack.callback(transport.stop)
+        now_s, now_unix_s = clock.now(), time.time()
+        start_unix_s, first_slot = start_of(plan, key.scheme, now_unix_s)
+        if rolling:
+            modulator = _modulator(key, channel.name, plan, first_slot)
+        start_s = now_s + start_unix_s - now_unix_s
+        journal = None
+        if config.journal is not None:
+            header = JournalHeader(
+                fingerprint=key.scheme.fingerprint, key_id=key.id, robot=config.robot.name, channel=channel.name,
+                symbols=None if plan.message is None else message_of(plan.message, key).symbols(first_slot),
+                repeat=plan.repeat, rate_hz=rate_hz, start_s=start_s, start_unix_s=start_unix_s,
+            )  # fmt: skip
+            journal = files.enter_context(
+                Journal(Path(config.journal.path), header, threaded=True, max_bytes=int(1e6 * config.journal.max_mb))
+            )
+        runtime = Runtime(modulator, guard, source, transport, journal)
+        if socket is not None:
+            session = Session(
+                config.robot.name, key, modulator, guard, source, transport, stats, journal,
+                lambda: math.floor((clock.now() - start_s) * rate_hz), start_unix_s, first_slot,
+            )  # fmt: skip
+            socket.serve(Control(session).answer)
+
+        # Closed first of all: whoever ends takes as long as it takes, and no watchdog is fed any more.
+        manager = ServiceManager()
+        stack.callback(manager.close)
+
+        def ending() -> bool:
+            now_s = clock.now()
+            manager.feed(now_s)
+            return asked_to_end() or service.error is not None or now_s >= start_s + plan.duration_s
+
+        with _long_lived_objects_uncollected(), realtime(config.realtime, _warn):
+            manager.ready()
+            run_loop(clock, rate_hz, runtime.step, start_s=start_s, stop=ending, stats=stats)
+        if service.error is not None:
+            raise MtmError(f"the robot's link failed ({service.error}); check the link") from service.error
+    return Outcome(stats, guard, source, journal, runtime.transport_errors)
+
+
+def _warn(text: str) -> None:
+    print(f"mtm-onboard: {text}", file=sys.stderr)
+
+
+def _link(config: RobotConfig, clock: Clock) -> Transport:
+    def make() -> Transport:
+        return make_transport(config.transport_kind, config.transport_options)
+
+    return ReconnectingTransport(make, clock, give_up_s=config.link.give_up_s) if config.link.reconnect else make()
+
+
+def start_of(plan: Plan, scheme: Scheme, now_unix_s: float) -> tuple[float, int]:
+    """When the message starts, in seconds since the Unix epoch, and in which slot (0 under the fixed schedule).
+
+    Under the rolling schedule a slot under way is left to its end, so that a restart plays no waveform again.
+    """
+    wanted_unix_s = now_unix_s + _LEAD_S if plan.start_unix_s is None else plan.start_unix_s
+    if scheme.schedule == "fixed":
+        return wanted_unix_s, 0
+    slot = next_slot(max(wanted_unix_s, now_unix_s + _LEAD_S), scheme)
+    return slot_start_unix_s(slot, scheme), slot
+
+
+def _check_clock(now_unix_s: float) -> None:
+    if now_unix_s < _EARLIEST_UNIX_S:
+        raise MtmError(
+            "this computer's clock was never set, and the rolling schedule's messages start by the time of day; "
+            "set the clock, for example by NTP"
+        )
+
+
+def _modulator(key: Key, channel_name: str, plan: Plan, first_slot: int) -> Modulator:
+    message = SILENCE if plan.message is None else message_of(plan.message, key)
+    modulator = Modulator(key.codebook(first_slot), channel_name, message, repeat=plan.repeat)
+    modulator.require_body_axes()
+    return modulator
+
+
+def _source(settings: SourceSettings) -> Source:
+    return StdinSource() if settings.port is None else UdpSource(settings.port)
+
+
+@contextmanager
+def _long_lived_objects_uncollected() -> Iterator[None]:
+    """Keep what is alive now out of later garbage collections, so that none of them takes milliseconds of a tick."""
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()

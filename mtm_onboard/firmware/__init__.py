@@ -1,0 +1,1 @@
+"""What a microcontroller plays: images made from a key."""

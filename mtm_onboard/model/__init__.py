@@ -1,0 +1,1 @@
+"""What every room of the runtime shares: a body velocity and the clocks."""

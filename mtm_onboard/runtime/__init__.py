@@ -1,0 +1,1 @@
+"""The loop and what a tick passes through: source, guard, modulator, send; real time."""

@@ -1,0 +1,45 @@
+"""The thread that does what a link needs between commands, such as heartbeats."""
+
+import threading
+from types import TracebackType
+from typing import Self
+
+from mtm_onboard.links.base import Transport
+from mtm_onboard.model.clock import Clock
+
+# Above the longest that opening or stopping a link takes.
+_LONGEST_FAREWELL_S = 5.0
+
+
+class ServiceThread:
+    """Calls `transport.service` each `service_period_s` while its block runs; the first failure ends it.
+
+    `error` holds that failure, and whoever runs the loop stops the robot for it. A call that never returns, such as a
+    write to a wedged driver, is left behind when the block ends.
+    """
+
+    def __init__(self, transport: Transport, clock: Clock) -> None:
+        self.error: BaseException | None = None
+        self._transport = transport
+        self._clock = clock
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="service", daemon=True)
+
+    def _run(self) -> None:
+        try:
+            while not self._ending.is_set():
+                self._transport.service(self._clock.now())
+                self._ending.wait(self._transport.service_period_s)
+        except BaseException as error:
+            # Whatever ends this thread, nobody serves the link any more.
+            self.error = error
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ending.set()
+        self._thread.join(_LONGEST_FAREWELL_S)

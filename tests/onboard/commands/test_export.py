@@ -1,0 +1,85 @@
+"""`mtm-onboard export` through the shipped command line."""
+
+import numpy as np
+import pytest
+
+from mtm_onboard.cli import main
+from mtm_onboard.firmware.image import parse_image, tag_is_good
+from mtm_onboard.protocol import Channel, Key, Scheme, load_key, save_key
+from mtm_onboard.protocol.framing import Framing
+from mtm_onboard.runtime.message import message_of
+from mtm_onboard.runtime.modulator import Modulator
+
+SECRET = b"not a real secret, only for test"
+
+
+@pytest.fixture
+def key_path(tmp_path, request):
+    schedule, robots = getattr(request, "param", ("rolling", 2))
+    channels = tuple(Channel(f"robot{n}", f"robot{n}", ("vx", "vy"), 2, 0.1) for n in range(robots))
+    scheme = Scheme("test", 50.0, (0.5, 5.0), 4, 100, channels, schedule=schedule)
+    save_key(Key("test", SECRET, scheme), tmp_path / "robot.key")
+    return tmp_path / "robot.key"
+
+
+def export(key_path, *options):
+    out = key_path.parent / "image.bin"
+    code = main(["export", "--key", str(key_path), "-o", str(out), *options])
+    return code, out
+
+
+def test_the_image_holds_the_channels_part_of_the_message(key_path, capsys):
+    code, out = export(key_path, "--channel", "robot1", "--symbols", "0,1,2,3", "--span", "9.5", "--first-message", "3")
+    image = parse_image(out.read_bytes())
+    assert code == 0
+    assert (image.messages, image.first_message, image.message_ticks) == (5, 3, 100)
+    assert image.fingerprint == load_key(key_path).scheme.fingerprint
+    assert tag_is_good(image, SECRET)
+    assert out.stat().st_mode & 0o777 == 0o600
+    assert "5 message(s) in 10 s" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("key_path", [("fixed", 1)], indirect=True)
+def test_one_channel_needs_no_name_and_a_fixed_message_repeats_unless_told_not_to(key_path):
+    assert parse_image(export(key_path, "--message", "5")[1].read_bytes()).repeats
+    assert not parse_image(export(key_path, "--message", "5", "--no-repeat")[1].read_bytes()).repeats
+
+
+def test_a_framed_message_is_written_as_each_slot_and_day_has_it(tmp_path):
+    framing = Framing("text", 16, check="tag", check_bits=16, interleave=True)
+    channels = (Channel("robot0", "robot0", ("vx", "vy"), 20, 0.1),)
+    key = Key("test", SECRET, Scheme("test", 50.0, (2.0, 20.0), 4, 400, channels, schedule="rolling", framing=framing))
+    save_key(key, tmp_path / "robot.key")
+    # The second of these three slots of 8 s begins at midnight.
+    _, out = export(tmp_path / "robot.key", "--text", "hi", "--first-message", "10799", "--messages", "3")
+    modulator = Modulator(key.codebook(10_799), "robot0", message_of("hi", key))
+    noise = []
+    for tick in range(1200):
+        noise.append(0.1 * modulator.perturbation(tick))
+        modulator.prepare(tick)
+    image = parse_image(out.read_bytes())
+    played = image.samples.T * np.array(image.steps[:2]) / (1 << 36)
+    assert played == pytest.approx(np.array(noise), abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--symbols", "0,1,2,3"], "--channel"),
+        (["--symbols", "0,1,2", "--channel", "robot0"], "3 symbols given"),
+        (["--message", "100000", "--channel", "robot0"], "does not fit"),
+        (["--message", "1", "--channel", "nobody"], "no channel"),
+        (["--message", "1", "--channel", "robot0", "--span", "-1"], "span"),
+        (["--message", "1", "--channel", "robot0", "--span", "inf"], "span"),
+        (["--message", "1", "--channel", "robot0", "--span", "1e9"], "several images"),
+        (["--message", "1", "--channel", "robot0", "--limit-mps", "0"], "limit"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_leaves_an_older_image_alone(key_path, options, words, capsys):
+    (key_path.parent / "image.bin").write_bytes(b"older")
+    code, out = export(key_path, *options)
+    error = capsys.readouterr().err
+    assert code == 1
+    assert words in error
+    assert error.count("\n") == 1
+    assert out.read_bytes() == b"older"

@@ -1,0 +1,182 @@
+"""The commands that make keys with a framing and that ask a running robot."""
+
+import pytest
+
+from mtm_onboard.cli import main
+from mtm_onboard.control.control_socket import ControlSocket
+from mtm_onboard.protocol import MtmError, load_key
+from mtm_onboard.protocol.framing import Framing
+
+FRAMED = (
+    "--preset", "robomaster-fleet", "--message-ticks", "6000", "--channel", "robot0:vx,vy:40:0.1",
+    "--channel", "robot1:vx,vy:40:0.1", "--payload", "text:8", "--check", "tag:32", "--code", "reed-solomon",
+    "--number-bits", "4", "--interleave", "--schedule", "rolling", "--epoch", "3", "--pooling", "majority",
+)  # fmt: skip
+CONFIG = """
+[robot]
+name = "robot0"
+channel = "robot1"
+[transport]
+kind = "none"
+[limits]
+speed_mps = 1.0
+turn_rate_radps = 2.0
+[source]
+kind = "stdin"
+"""
+
+
+def keygen(folder, *options) -> int:
+    return main(["keygen", "--id", "fake-key", "--out", str(folder / "robot.key"), *options])
+
+
+@pytest.fixture
+def config(tmp_path):
+    path = tmp_path / "robot.toml"
+    path.write_text(CONFIG + f'[control]\nsocket = "{tmp_path / "r.sock"}"\n')
+    return path
+
+
+def test_keygen_provisions_a_framing_and_the_schedule_s_options(tmp_path):
+    assert keygen(tmp_path, *FRAMED) == 0
+    scheme = load_key(tmp_path / "robot.key").scheme
+    assert scheme.framing == Framing("text", 64, 4, "tag", 32, "reed-solomon", interleave=True)
+    assert (scheme.schedule, scheme.epoch, scheme.pooling) == ("rolling", 3, "majority")
+
+
+def test_without_framing_options_a_message_is_a_plain_number(tmp_path):
+    assert keygen(tmp_path, "--preset", "robomaster-fleet") == 0
+    assert load_key(tmp_path / "robot.key").scheme.framing is None
+
+
+def test_an_integer_s_size_is_in_bits(tmp_path):
+    assert keygen(tmp_path, "--preset", "robomaster-fleet", "--payload", "integer:5") == 0
+    assert load_key(tmp_path / "robot.key").scheme.framing == Framing("integer", 5)
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "says"),
+    [
+        (("--check", "tag:32"), 2, "needs --payload"),
+        (("--interleave",), 2, "needs --payload"),
+        (("--payload", "text"), 2, "--payload"),
+        (("--payload", "song:3"), 1, "choose one of"),
+        (("--payload", "text:3"), 1, "symbols would hold them"),
+        (("--pooling", "guess"), 1, "pooling"),
+    ],
+)
+def test_a_framing_that_cannot_be_is_refused_and_no_key_is_written(tmp_path, capsys, options, code, says):
+    try:
+        ended = keygen(tmp_path, "--preset", "robomaster-fleet", *options)
+    except SystemExit as leaving:
+        ended = leaving.code
+    assert ended == code
+    assert says in capsys.readouterr().err
+    assert not (tmp_path / "robot.key").exists()
+
+
+def test_show_says_in_words_what_a_frame_holds(tmp_path, capsys):
+    keygen(tmp_path, *FRAMED)
+    capsys.readouterr()
+    main(["show", "--key", str(tmp_path / "robot.key")])
+    shown = capsys.readouterr().out
+    for fact in ("120 s, 80 symbols", "up to 8 bytes of text: 64 bits, 0.533 bits/s", "modulo 16", "tag of 32 bits",
+                 "GF(2^6), 8 of 26 code symbols parity", "4 wrong or 8 missing", ", interleaved"):  # fmt: skip
+        assert fact in shown
+    assert load_key(tmp_path / "robot.key").secret.hex() not in shown
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (("--message", "5"), "text, not a number"),
+        (("--text", "much too long"), "1 to 8 bytes"),
+        (("--hex", "00f"), "two hexadecimal digits"),
+        (("--symbols", "1,2"), "symbols cannot be given"),
+    ],
+)
+def test_run_refuses_a_payload_that_the_key_does_not_carry(tmp_path, config, capsys, content, says):
+    keygen(tmp_path, *FRAMED)
+    assert main(["run", "--config", str(config), "--key", str(tmp_path / "robot.key"), *content]) == 1
+    error = capsys.readouterr().err
+    assert says in error
+    assert error.count("\n") == 1
+
+
+@pytest.fixture
+def robot(tmp_path):
+    """A control socket that answers like a robot; yields what it was asked."""
+    asked = []
+
+    def answer(request):
+        asked.append(request)
+        if request["command"] == "send":
+            if request["content"] == {"number": 999}:
+                raise MtmError("the message 999 does not fit; give a smaller one")
+            slot = 7 if "text" in request["content"] else None
+            replaces = 1 if "hex" in request["content"] else None
+            return {"tick": 120, "unix_s": 1_800_000_000.25, "slot": slot, "number": 2, "replaces": replaces}
+        if request["command"] == "silence":
+            return {"tick": 120, "unix_s": 1_800_000_000.25, "slot": 7, "replaces": "silence"}
+        if request["command"] == "status":
+            return {"robot": "r0", "late_p99_ms": 0.5, "message": None, "link": {"heartbeats": 3}}
+        return {"stopped": True}
+
+    with ControlSocket(tmp_path / "r.sock") as control:
+        control.serve(answer)
+        yield asked
+
+
+@pytest.mark.parametrize(
+    ("content", "request_", "says"),
+    [
+        (("--message", "7"), {"number": 7}, "message 2 begins at 2027-01-15 08:00:00.250000 UTC (1800000000.250000)\n"),
+        (("--text", "-hi"), {"text": "-hi"}, "UTC (1800000000.250000), slot 7\n"),
+        (("--hex", "00ff"), {"hex": "00ff"}, "in the place of message 1 that was waiting\n"),
+        (("--symbols", "1,2"), {"symbols": [1, 2]}, "message 2 begins"),
+    ],
+)
+def test_send_asks_for_the_message_and_says_when_it_begins(config, robot, capsys, content, request_, says):
+    assert main(["send", "--config", str(config), "=".join(content)]) == 0
+    assert robot == [{"command": "send", "content": request_}]
+    assert says in capsys.readouterr().out
+
+
+def test_send_asks_for_silence_and_says_when_it_begins(config, robot, capsys):
+    assert main(["send", "--config", str(config), "--silence"]) == 0
+    assert robot == [{"command": "silence"}]
+    assert capsys.readouterr().out == (
+        "silence begins at 2027-01-15 08:00:00.250000 UTC (1800000000.250000), slot 7, "
+        "in the place of silence that was waiting\n"
+    )
+
+
+def test_silence_is_no_content_beside_another(config, robot):
+    with pytest.raises(SystemExit):
+        main(["send", "--config", str(config), "--silence", "--message", "7"])
+    assert robot == []
+
+
+def test_send_says_the_robot_s_sentence_when_it_refuses(config, robot, capsys):
+    assert main(["send", "--config", str(config), "--message", "999"]) == 1
+    assert capsys.readouterr().err == "mtm-onboard: the message 999 does not fit; give a smaller one\n"
+
+
+def test_status_and_stop_ask_the_socket_that_is_named(tmp_path, robot, capsys):
+    path = str(tmp_path / "r.sock")
+    assert main(["status", "--socket", path]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert [line.split() for line in shown] == [
+        ["robot", "r0"], ["late", "p99", "ms", "0.5"], ["message", "none"], ["link", "heartbeats", "3"],
+    ]  # fmt: skip
+    assert main(["stop", "--socket", path]) == 0
+    assert "stands still" in capsys.readouterr().out
+    assert robot == [{"command": "status"}, {"command": "stop"}]
+
+
+def test_a_robot_that_does_not_run_or_has_no_socket_gets_one_sentence(tmp_path, config, capsys):
+    assert main(["stop", "--config", str(config)]) == 1
+    assert "no running robot answers" in capsys.readouterr().err
+    config.write_text(CONFIG)
+    assert main(["stop", "--config", str(config)]) == 1
+    assert "no control socket" in capsys.readouterr().err

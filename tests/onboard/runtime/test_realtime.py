@@ -1,0 +1,150 @@
+import os
+import threading
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from mtm_onboard.protocol import MtmError
+from mtm_onboard.runtime.config import RealtimeSettings, config_from_table
+from mtm_onboard.runtime.realtime import realtime
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "sched_setscheduler"), reason="this system has no SCHED_FIFO")
+
+
+@pytest.fixture
+def system(monkeypatch):
+    """A system that grants everything; what it was asked for, in order."""
+    asked = []
+    monkeypatch.setattr(os, "sched_getscheduler", lambda thread: os.SCHED_OTHER)
+    monkeypatch.setattr(os, "sched_getparam", lambda thread: os.sched_param(0))
+    monkeypatch.setattr(os, "sched_getaffinity", lambda thread: {0, 1, 2})
+    monkeypatch.setattr(
+        os, "sched_setscheduler", lambda thread, policy, given: asked.append((policy, given.sched_priority))
+    )
+    monkeypatch.setattr(os, "sched_setaffinity", lambda thread, cpus: asked.append(set(cpus)))
+    monkeypatch.setattr("ctypes.CDLL", lambda *_, **__: Libc(asked))
+    return asked
+
+
+class Libc:
+    def __init__(self, asked, answer: int = 0) -> None:
+        self._asked, self._answer = asked, answer
+
+    def mlockall(self, what: int) -> int:
+        self._asked.append("locked")
+        return self._answer
+
+    def munlockall(self) -> int:
+        self._asked.append("unlocked")
+        return 0
+
+
+def test_what_is_asked_for_is_in_force_in_the_block_and_taken_back_after_it(system):
+    with realtime(RealtimeSettings(priority=40, lock_memory=True, cpu=1), pytest.fail):
+        assert system == ["locked", {1}, (os.SCHED_FIFO, 40)]
+        system.clear()
+    assert system == [(os.SCHED_OTHER, 0), {0, 1, 2}, "unlocked"]
+
+
+def test_it_is_taken_back_when_the_block_fails(system):
+    with pytest.raises(MtmError), realtime(RealtimeSettings(priority=40), pytest.fail):
+        raise MtmError("the link is down; check it")
+    assert system == [(os.SCHED_FIFO, 40), (os.SCHED_OTHER, 0)]
+
+
+def test_without_the_section_the_system_is_asked_for_nothing(system):
+    with realtime(RealtimeSettings(), pytest.fail):
+        pass
+    assert system == []
+
+
+def test_what_the_system_refuses_is_one_warning_with_remedies_and_the_run_goes_on(system, monkeypatch):
+    def refuse(*_):
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    monkeypatch.setattr("ctypes.CDLL", lambda *_, **__: Libc(system, answer=-1))
+    warnings = []
+    with realtime(RealtimeSettings(priority=40, lock_memory=True, cpu=1), warnings.append):
+        # The rest of what was asked for is in force.
+        assert system == ["locked", {1}]
+    assert system[2:] == [{0, 1, 2}]
+    (warning,) = warnings
+    assert "LimitRTPRIO=40" in warning
+    assert "LimitMEMLOCK=infinity" in warning
+    assert "cpu" not in warning
+
+
+def test_a_processor_that_is_not_there_is_a_warning():
+    warnings = []
+    with realtime(RealtimeSettings(cpu=1023), warnings.append):
+        pass
+    assert "cpu 1023 is refused" in warnings[0]
+
+
+def test_a_system_without_such_calls_is_a_warning(monkeypatch):
+    monkeypatch.delattr(os, "sched_getscheduler")
+    warnings = []
+    with realtime(RealtimeSettings(priority=1), warnings.append):
+        pass
+    assert "this system has no SCHED_FIFO" in warnings[0]
+
+
+def test_only_the_thread_that_asks_is_pinned():
+    before = os.sched_getaffinity(0)
+    (cpu, *_) = sorted(before)
+    there, here = threading.Event(), threading.Event()
+
+    def loop() -> None:
+        with realtime(RealtimeSettings(cpu=cpu), pytest.fail):
+            seen.append(os.sched_getaffinity(0))
+            there.set()
+            here.wait(10.0)
+        seen.append(os.sched_getaffinity(0))
+
+    seen = []
+    thread = threading.Thread(target=loop)
+    thread.start()
+    there.wait(10.0)
+    assert os.sched_getaffinity(0) == before
+    here.set()
+    thread.join()
+    assert seen == [{cpu}, before]
+
+
+def table(**realtime_section):
+    return {
+        "robot": {"name": "r", "channel": "a"}, "transport": {"kind": "none"}, "source": {"kind": "stdin"},
+        "limits": {"speed_mps": 1.0, "turn_rate_radps": 2.0}, "realtime": realtime_section,
+    }  # fmt: skip
+
+
+def test_the_configuration_may_ask_for_it():
+    asked = config_from_table(table(priority=40, lock_memory=True, cpu=3)).realtime
+    assert asked == RealtimeSettings(40, True, 3)
+    assert config_from_table(table()).realtime == RealtimeSettings()
+
+
+def test_the_documented_section_is_one_that_can_be_asked_for():
+    text = (Path(__file__).parents[3] / "docs" / "robot.example.toml").read_text(encoding="utf-8")
+    _, *lines = text.partition("# [realtime]")[2].partition("\n\n")[0].splitlines()
+    section = "\n".join(line.removeprefix("# ") for line in lines)
+    assert config_from_table(table(**tomllib.loads(section))).realtime == RealtimeSettings(40, True, 3)
+
+
+@pytest.mark.parametrize(
+    ("section", "sentence"),
+    [
+        ({"priority": 0}, "choose 1 to 99"),
+        ({"priority": 100}, "choose 1 to 99"),
+        ({"priority": True}, "give a whole number"),
+        ({"cpu": -1}, "from 0 on"),
+        ({"cpu": 1 << 40}, "from 0 on"),
+        ({"lock_memory": 1}, "give true or false"),
+        ({"nice": 1}, "unknown field"),
+    ],
+)
+def test_what_no_system_grants_is_refused(section, sentence):
+    with pytest.raises(MtmError, match=sentence):
+        config_from_table(table(**section))

@@ -1,0 +1,69 @@
+import threading
+
+from mtm_onboard.links.none import NullTransport
+from mtm_onboard.model.clock import SystemClock
+from mtm_onboard.runtime.service import ServiceThread
+
+
+class Attended(NullTransport):
+    """Tells when it was served three times, and fails after that when asked to."""
+
+    service_period_s = 0.001
+
+    def __init__(self, *, failing: bool) -> None:
+        super().__init__()
+        self.times_s: list[float] = []
+        self.enough = threading.Event()
+        self._failing = failing
+
+    def service(self, now_s: float) -> None:
+        self.times_s.append(now_s)
+        if len(self.times_s) >= 3:
+            self.enough.set()
+            if self._failing:
+                raise OSError("cable pulled")
+
+
+def test_the_link_is_served_again_and_again_until_the_block_ends():
+    link = Attended(failing=False)
+    with ServiceThread(link, SystemClock()) as service:
+        assert link.enough.wait(10.0)
+    assert service.error is None
+    assert link.times_s == sorted(link.times_s)
+    assert "service" not in {thread.name for thread in threading.enumerate()}
+
+
+def test_a_failure_ends_the_service_and_is_kept():
+    link = Attended(failing=True)
+    with ServiceThread(link, SystemClock()) as service:
+        assert link.enough.wait(10.0)
+    assert str(service.error) == "cable pulled"
+    assert len(link.times_s) == 3
+
+
+def test_whatever_ends_the_thread_is_an_error():
+    class Ending(NullTransport):
+        def service(self, now_s: float) -> None:
+            raise SystemExit
+
+    with ServiceThread(Ending(), SystemClock()) as service:
+        vars(service)["_thread"].join(10.0)
+        assert isinstance(service.error, SystemExit)
+
+
+def test_a_call_that_never_returns_does_not_hold_up_the_end(monkeypatch):
+    monkeypatch.setattr("mtm_onboard.runtime.service._LONGEST_FAREWELL_S", 0.05)
+    begun, released = threading.Event(), threading.Event()
+
+    class Wedged(NullTransport):
+        def service(self, now_s: float) -> None:
+            begun.set()
+            released.wait(20.0)
+
+    with ServiceThread(Wedged(), SystemClock()) as service:
+        assert begun.wait(10.0)
+    thread = vars(service)["_thread"]
+    assert thread.is_alive()
+    released.set()
+    thread.join(10.0)
+    assert not thread.is_alive()
