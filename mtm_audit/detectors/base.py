@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mtm_audit.detectors.matched.correlate import Prepared
 from mtm_audit.model.glimpse import Glimpse
 from mtm_audit.model.timing import Onset, Timing
 from mtm_audit.model.track import Floats
@@ -52,13 +53,15 @@ class ChannelReading:
 
     `posteriors` (positions, M): probability of each symbol at each position, given that a message is there;
     `window_ratios` (windows, M): log-likelihood ratios in nats, the same for anything but the symbol;
-    `decoy_strengths` (decoys,): the strength that the same search found under keys that nobody holds.
+    `decoy_strengths` (decoys,): the strength that the same search found under keys that nobody holds; `prepared` is
+    the motion made ready for evidence, None from a detector that gives none.
     """
 
     reading: Reading
     posteriors: Floats
     window_ratios: Floats
     decoy_strengths: Floats
+    prepared: Prepared | None = None
 
 
 class Detector(Protocol):

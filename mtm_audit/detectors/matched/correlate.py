@@ -96,9 +96,9 @@ def _moving_sum(values: Floats, cells: int) -> Floats:
     return difference
 
 
-def stacked_tones(codebook: Codebook, channel: Channel, number: int) -> Tones:
-    """All candidates' tones in the layout of `Heard.projections`: (M, axes, 2 K)."""
-    tones = codebook.tones(channel, number)
+def stacked_tones(codebook: Codebook, channel: Channel, number: int, symbols: Sequence[int] | None = None) -> Tones:
+    """Candidates' tones in the layout of `Heard.projections`, all of them unless `symbols` are named: (M, axes, 2 K)."""
+    tones = codebook.tones(channel, number, symbols)
     return np.concatenate([tones.real, -tones.imag], axis=-1).astype(np.float32)
 
 

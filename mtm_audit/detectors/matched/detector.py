@@ -8,7 +8,7 @@ from scipy.special import softmax
 
 from mtm_audit.detectors.base import ChannelReading, Observation, Reading
 from mtm_audit.detectors.matched.byclock import Found
-from mtm_audit.detectors.matched.correlate import prepare
+from mtm_audit.detectors.matched.correlate import Prepared, prepare
 from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recording_noise
 from mtm_audit.detectors.matched.fleet import Member, share_timings
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
@@ -75,7 +75,8 @@ class MatchedDetector:
         moved = list(motions.values())
         moved = _along_principal_axes(moved)
         noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
-        searched = _searched([codebook, *decoys], channels, moved, noise, onset, progress)
+        prepared = [prepare(motion, noise, row) for row, motion in enumerate(moved)]
+        searched = _searched([codebook, *decoys], channels, prepared, onset, progress)
         timings = [found[0].timing for found in searched]
         free = onset is None
         windows = _all_windows(codebook, channels, moved, timings, searched=free)
@@ -90,7 +91,7 @@ class MatchedDetector:
             strengths = np.array([other.evidence for other in searched[row]])
             reading = _reading(codebook, channels[row], row, windows, found, timings[row], float(strengths[0]))
             readings[number] = ChannelReading(
-                reading, softmax(reading.scores, axis=1), reading.window_scores, strengths[1:]
+                reading, softmax(reading.scores, axis=1), reading.window_scores, strengths[1:], prepared[row]
             )
         return readings
 
@@ -98,13 +99,11 @@ class MatchedDetector:
 def _searched(
     codebooks: Sequence[Codebook],
     channels: Sequence[Channel],
-    motions: Sequence[Motion],
-    noise: NoiseModel,
+    prepared: Sequence[Prepared],
     onset: Onset,
     progress: Callable[[float], None] | None,
 ) -> list[list[Found]]:
     """For each robot, for each codebook the timing; robots whose windows are of one length share what they found."""
-    prepared = [prepare(motion, noise, row) for row, motion in enumerate(motions)]
     searched = []
     for row, (channel, robot) in enumerate(zip(channels, prepared, strict=True)):
         part = None if progress is None else _part_of(progress, row, len(channels))

@@ -1,0 +1,103 @@
+"""Log e-values of candidates under hypotheses of timing, plant and gain.
+
+A hypothesis gives a function f of a candidate's tones t, the likelihood ratio exp(u . t - sum q t^2 / 2) of the motion
+with the candidate against the motion without it. u and q follow from the recording and the hypothesis alone. If the key
+had no part in the motion, t is drawn by the key stream's own law whatever the recording holds, so that f divided by its
+mean over that law (`normaliser`) has mean 1 over keys: it is an e-value.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mtm_audit.detectors.matched.projections import Projections
+from mtm_audit.model.track import Floats
+from mtm_audit.significance.gains import Levels, precision_factors
+from mtm_audit.significance.normaliser import log_mean_normal, log_mean_sphere
+from mtm_onboard.protocol.scheme import Power
+
+Integers = NDArray[np.int64]
+_MOST_TOGETHER = 1 << 21
+
+
+@dataclass(frozen=True)
+class Hypotheses:
+    """Where in a table hypotheses stand: numbers of `timings`, `plants`, `levels` and `turns`, each (hypotheses,)."""
+
+    timings: Integers
+    plants: Integers
+    levels: Integers
+    turns: Integers
+
+
+def approximate_log_e(
+    projections: Projections, tones: Floats, levels: Levels, turns: Floats, timings: Integers, plants: Integers
+) -> Floats:
+    """Log e-values of pairs of a timing and a plant: (pairs, levels, orientations, groups, candidates).
+
+    `tones` (groups, candidates, injected axes, 2 K); `timings` and `plants` (pairs,). With every observed axis taken to
+    be seen alike and tones to be normal: to choose hypotheses and to weigh them, never as evidence.
+    """
+    groups, candidates = tones.shape[:2]
+    each = len(levels.magnitudes) * len(turns) * groups * candidates
+    step = max(1, _MOST_TOGETHER // each)
+    return np.concatenate(
+        [
+            _approximate(projections, tones, levels, turns, timings[at : at + step], plants[at : at + step])
+            for at in range(0, len(timings), step)
+        ]
+    )
+
+
+def _approximate(
+    projections: Projections, tones: Floats, levels: Levels, turns: Floats, timings: Integers, plants: Integers
+) -> Floats:
+    count = projections.power.shape[1]
+    power = np.tile(projections.power[plants], 2)
+    factors = np.tile(precision_factors(levels, projections.power[plants], projections.cells), 2)
+    linear = projections.linear[timings, plants]
+    seen = projections.seen[timings].mean(axis=-1)
+    magnitudes = levels.magnitudes[:, None, None]
+    unit = 0.5 * magnitudes**2 * factors * power
+    quadratic = unit[:, :, None] * seen[None, :, :, None]
+    total = count + quadratic
+    weighted = factors[:, :, None, None] * linear
+    found = np.einsum("lpgok,gcak->lpgoac", weighted, tones, optimize=True)
+    spent = np.einsum("lpk,gcak->lpgc", unit, tones**2, optimize=True) * seen[None, :, :, None]
+    moments = np.einsum("lpgok,lpgqk,lpgk->lpgoq", weighted, weighted, 1.0 / total, optimize=True)
+    moments *= magnitudes[..., None, None] ** 2
+    aligned = np.einsum("roa,lpgoac->lprgc", turns, found, optimize=True) * magnitudes[..., None, None]
+    curved = 0.5 * np.einsum("roa,rqa,lpgoq->lprg", turns, turns, moments, optimize=True)
+    curved -= 0.5 * turns.shape[2] * np.log1p(quadratic / count).sum(axis=-1)[:, :, None]
+    result = aligned - spent[:, :, None] - curved[..., None]
+    return np.asarray(result.transpose(1, 0, 2, 3, 4))
+
+
+def log_e(
+    projections: Projections, tones: Floats, levels: Levels, turns: Floats, chosen: Hypotheses, law: Power
+) -> Floats:
+    """Exact log e-values under chosen hypotheses: (hypotheses, groups, candidates)."""
+    linear, quadratic = weights(projections, levels, turns, chosen)
+    return log_e_of(linear, quadratic, tones, law)
+
+
+def log_e_of(linear: Floats, quadratic: Floats, tones: Floats, law: Power) -> Floats:
+    """Log e-values of `tones` (groups, candidates, axes, 2 K) under weights (hypotheses, groups, axes, 2 K)."""
+    log_mean = log_mean_normal if law == "ensemble" else log_mean_sphere
+    found = np.einsum("hgak,gcak->hgc", linear, tones, optimize=True)
+    found -= 0.5 * np.einsum("hgak,gcak->hgc", quadratic, tones**2, optimize=True)
+    return np.asarray(found - log_mean(linear, quadratic).sum(axis=-1)[..., None])
+
+
+def weights(projections: Projections, levels: Levels, turns: Floats, chosen: Hypotheses) -> tuple[Floats, Floats]:
+    """U and q of each hypothesis, group and injected axis: (hypotheses, groups, axes, 2 K) each."""
+    power = projections.power[chosen.plants]
+    magnitudes, reliefs = levels.magnitudes[chosen.levels], levels.reliefs[chosen.levels]
+    share = precision_factors(Levels(magnitudes, reliefs, magnitudes), projections.power, projections.cells)
+    factors = np.tile(share[np.arange(len(magnitudes)), chosen.plants], 2)
+    gains = magnitudes[:, None, None] * turns[chosen.turns]
+    linear = np.einsum("hoa,hgok->hgak", gains, projections.linear[chosen.timings, chosen.plants], optimize=True)
+    seen = np.einsum("hoa,hgo->hga", gains**2, projections.seen[chosen.timings], optimize=True)
+    spread = 0.5 * factors * np.tile(power, 2)
+    return linear * factors[:, None, None], seen[..., None] * spread[:, None, None]

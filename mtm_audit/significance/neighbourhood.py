@@ -1,0 +1,97 @@
+"""Timings near a found one, on a grid that is fixed before the key has a say, with their prior probabilities."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mtm_audit.model.timing import Onset, OnsetRange, Timing
+from mtm_audit.model.track import Floats
+
+# A known onset leaves open when the robot followed: from a little before, where clocks differ, to a slow vehicle.
+_EARLIEST_S, _LATEST_S = -0.04, 0.42
+_SHIFTS = np.arange(-4, 5)
+_RATE_STEPS = np.arange(-2, 3)
+# Clocks that are off by more are possible but rare: the scale of a Cauchy prior over relative rates.
+_USUAL_RATE_ERROR = 0.003
+
+
+@dataclass(frozen=True)
+class Span:
+    """Which windows of a channel a recording shows: their `numbers` (windows,), lengths in ticks and cells in seconds.
+
+    `order` is how many rotations of the message the schedule leaves open, 1 where windows say their number.
+    """
+
+    numbers: NDArray[np.int64]
+    window_ticks: int
+    step_s: float
+    origin_s: float
+    nominal_hz: float
+    order: int
+
+
+@dataclass(frozen=True)
+class Neighbourhood:
+    """`starts_s` (timings, windows), and the log prior probability of each timing, (timings,).
+
+    All timings of the grid, of which these are a part, have a prior of sum 1 at the most.
+    """
+
+    starts_s: Floats
+    log_priors: Floats
+
+    @property
+    def log_prior(self) -> float:
+        """Log prior probability of the whole neighbourhood."""
+        return float(np.logaddexp.reduce(self.log_priors))
+
+
+def neighbourhood(span: Span, timing: Timing, onset: Onset) -> Neighbourhood:
+    """The grid's timings around `timing`: onsets in half cells, rates that move a recording's end by as much.
+
+    A known onset is the pivot that changes of the rate leave in place, else it is the middle window.
+    """
+    half_s = 0.5 * span.step_s
+    known_s = float(onset) if isinstance(onset, int | float) else None
+    pivot = 0 if known_s is not None else int(span.numbers[len(span.numbers) // 2])
+    lasting_s = span.window_ticks / span.nominal_hz
+    reach = max(1, int(np.abs(span.numbers - pivot).max()) + 1)
+    spacing = half_s / (reach * lasting_s)
+    nearest = round((timing.rate_hz / span.nominal_hz - 1.0) / spacing)
+    relative = (nearest + _RATE_STEPS) * spacing
+    if known_s is not None:
+        shifts_s = np.arange(math.floor(_EARLIEST_S / half_s), math.ceil(_LATEST_S / half_s) + 1) * half_s
+        pivot_s, count = known_s, len(shifts_s)
+    else:
+        found_s = timing.onset_s + pivot * span.window_ticks / timing.rate_hz
+        pivot_s = span.origin_s + round((found_s - span.origin_s) / half_s) * half_s
+        shifts_s, count = _SHIFTS * half_s, _onsets(span, onset, half_s)
+    lengths_s = span.window_ticks / (span.nominal_hz * (1.0 + relative))
+    starts_s = pivot_s + shifts_s[:, None, None] + (span.numbers - pivot) * lengths_s[:, None]
+    rates = _log_rate_priors(relative, spacing)
+    priors = np.broadcast_to(rates - np.log(count), (len(shifts_s), len(relative)))
+    return Neighbourhood(starts_s.reshape(-1, len(span.numbers)), priors.ravel())
+
+
+def _log_rate_priors(relative: Floats, spacing: float) -> Floats:
+    """A Cauchy prior on a grid of that spacing, of sum 1 over the whole grid."""
+    density = -np.log1p((relative / _USUAL_RATE_ERROR) ** 2)
+    # The sum of 1 / (1 + (n a)^2) over all whole n is (pi / a) coth(pi / a).
+    turns = np.pi * _USUAL_RATE_ERROR / spacing
+    return np.asarray(density + np.log(np.tanh(turns) / turns))
+
+
+def _onsets(span: Span, onset: Onset, half_s: float) -> int:
+    """How many onsets the grid has: one window's worth where nothing is known, for each order of the symbols."""
+    if isinstance(onset, OnsetRange):
+        return math.ceil((onset.high_s - onset.low_s + _LATEST_S - _EARLIEST_S) / half_s) + 1
+    return span.order * (math.ceil(1.25 * span.window_ticks / span.nominal_hz / half_s) + 1)
+
+
+def at_phase_of(own: Timing, other: Timing, window_ticks: int) -> Timing:
+    """The other's rate and window phase, counted as `own` counts its windows; the nearest in time."""
+    length_s = window_ticks / other.rate_hz
+    ahead_s = math.remainder(other.onset_s - own.onset_s, length_s)
+    return Timing(own.onset_s + ahead_s, other.rate_hz)
