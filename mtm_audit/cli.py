@@ -67,10 +67,13 @@ def decode(
         str, typer.Option(metavar="NAME", help="How to look for the noise: matched, or coherency as the paper does.")
     ] = "matched",
     decoys: Annotated[
-        int, typer.Option(min=8, help="Keys that nobody holds, to compare with; five times as many in doubt.")
-    ] = 40,
+        int | None,
+        typer.Option(
+            min=8, max=10_000, help="Keys that nobody holds, to compare with: 40 for coherency, none for matched."
+        ),
+    ] = None,
     threshold: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="Largest p-value that still counts as a message.")
+        float, typer.Option(min=0.0, max=1.0, help="How often a message that is called decoded may be wrong.")
     ] = 1e-4,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON (docs/decode-json.md) instead of a table.")
@@ -95,13 +98,16 @@ def decode(
     onset_s, pairs, at_unix_s = _onset_s(onset), _pairs(assign or []), _unix_s(at)
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.decode import DecodeOptions, run_decode
-        from mtm_audit.decoding.decode import DecodeSettings
+        from mtm_audit.decoding.settings import DecodeSettings
         from mtm_audit.detectors.matched.profile import load_profile
         from mtm_audit.model.recorded_at import RecordedAt
 
         known = None if profile is None else load_profile(profile)
         recorded = None if at_unix_s is None else RecordedAt(at_unix_s, at_error)
-        settings = DecodeSettings(detector, onset_s, decoys, threshold, pairs, known, recorded)
+        settings = DecodeSettings(
+            detector=detector, onset_s=onset_s, decoys=decoys, threshold=threshold, assignment=pairs, profile=known,
+            at=recorded,
+        )  # fmt: skip
         code = run_decode(DecodeOptions(tuple(paths), key, tracker, settings, as_json, plot, explain))
     raise typer.Exit(code)
 
@@ -128,9 +134,9 @@ def learn_profile(
     onset_s, pairs = _onset_s(onset), _pairs(assign or [])
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.profile import ProfileOptions, run_profile
-        from mtm_audit.decoding.decode import DecodeSettings
+        from mtm_audit.decoding.settings import DecodeSettings
 
-        settings = DecodeSettings("matched", onset_s, assignment=pairs)
+        settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
         run_profile(ProfileOptions(tuple(paths), key, out, tracker, settings))
 
 

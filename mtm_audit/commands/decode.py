@@ -7,17 +7,19 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from mtm_audit.decoding.decode import DecodeSettings, Decoding, decode_tracks
+from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.decoding.decoding import Decoding
+from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.detectors import make_detector
 from mtm_audit.ingest.recording import read_recording, recording_files
 from mtm_audit.model.recording import Recording
+from mtm_audit.model.stage import StageError, stage
 from mtm_audit.readers.video import inspect_video
 from mtm_audit.reporting.json_report import json_report
 from mtm_audit.reporting.remarks import remarks
-from mtm_audit.reporting.stages import Stage, failed_stage, stages_of_decoding, stages_of_recording, text_of_stages
+from mtm_audit.reporting.stages import Stage, stages_of_decoding, stages_of_recording, text_of_stages
 from mtm_audit.reporting.text import print_report
 from mtm_audit.tracking.registry import tracker
-from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key, load_key
 
 _PIPE_COLUMNS = 140
@@ -43,10 +45,9 @@ def run_decode(options: DecodeOptions) -> int:
     stages: list[Stage] = []
     try:
         recording, decoding = _decode(options, stages)
-    except MtmError as error:
+    except StageError as error:
         if options.explain:
-            stages[-1] = Stage(stages[-1].name, (str(error),), failed=True)
-            sys.stderr.write(text_of_stages(stages))
+            sys.stderr.write(text_of_stages([*stages, Stage(error.stage, (str(error),), failed=True)]))
         raise
     if options.explain:
         # Beside JSON the explanation must not get into what a program reads.
@@ -67,28 +68,22 @@ def _check(options: DecodeOptions) -> None:
 
 
 def _decode(options: DecodeOptions, stages: list[Stage]) -> tuple[Recording, Decoding]:
-    """Run the chain; when a part raises, the last of `stages` is the one that failed."""
-    stages.append(Stage("key", ("",)))
-    key = load_key(options.key)
-    stages[-1] = Stage("key", (f"{key.id}, scheme {key.scheme.name} (fingerprint {key.scheme.fingerprint})",))
-    stages.append(Stage("recording", ("",)))
-    files, kind = recording_files(options.paths)
+    """Run the chain and tell each stage that is done; a refusal names the stage that could not go on."""
+    with stage("key"):
+        key = load_key(options.key)
+    stages.append(Stage("key", (f"{key.id}, scheme {key.scheme.name} (fingerprint {key.scheme.fingerprint})",)))
     with _progress() as progress:
-        frames = inspect_video(files[0]).frame_count if kind == "video" else None
+        with stage("recording"):
+            files, kind = recording_files(options.paths)
+            frames = inspect_video(files[0]).frame_count if kind == "video" else None
         if kind == "video":
-            stages[-1] = Stage("recording", (f"video {files[0]}, {frames or 'an unknown number of'} frames",))
-            stages.append(Stage("tracks", ("",)))
+            stages.append(Stage("recording", (f"video {files[0]}, {frames or 'an unknown number of'} frames",)))
         task = progress.add_task(f"tracking {files[0].name}", total=frames, visible=kind == "video")
-        recording = read_recording(files, kind, options.tracker, lambda done: progress.update(task, completed=done))
+        with stage("tracks" if kind == "video" else "recording"):
+            recording = read_recording(files, kind, options.tracker, lambda done: progress.update(task, completed=done))
         progress.remove_task(task)
         stages[1:] = stages_of_recording(recording)
-        try:
-            return recording, _read(recording, key, options.settings, progress)
-        except MtmError:
-            failed = failed_stage(recording.tracks, key.scheme, options.settings)
-            if failed != stages[-1].name:
-                stages.append(Stage(failed, ("",)))
-            raise
+        return recording, _read(recording, key, options.settings, progress)
 
 
 def _read(recording: Recording, key: Key, settings: DecodeSettings, progress: Progress) -> Decoding:

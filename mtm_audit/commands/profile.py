@@ -4,7 +4,9 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from mtm_audit.decoding.decode import DecodeSettings, Decoding, decode_tracks
+from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.decoding.decoding import Decoding
+from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.detectors.base import Observation
 from mtm_audit.detectors.matched.learn import learn_profile
 from mtm_audit.detectors.matched.profile import PlantProfile, save_profile

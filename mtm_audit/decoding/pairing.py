@@ -1,69 +1,38 @@
-"""Which free track shows which body, searched: all pairs are read, and the best one-to-one choice is taken.
+"""The best one-to-one choice of tracks for bodies, by how strongly each track shows each channel.
 
-The choice is made anew for the key and for each decoy, so that it is part of what a verdict compares.
+The choice is made for the key and for each decoy alike, so that it is part of what decoys are compared by.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from mtm_audit.detectors.base import ChannelReading, Observation
-from mtm_audit.model.glimpse import Glimpse
 from mtm_audit.model.track import Floats
-from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel
 
-# Reads observations under the key and all decoys.
-Read = Callable[[Sequence[Observation]], list[ChannelReading | MtmError]]
-Readings = list[list[ChannelReading | MtmError]]
 
+def best_pairs(channels: Sequence[Channel], strengths: Floats) -> tuple[dict[str, int], Floats]:
+    """By body the number of its track, as the first codebook chooses, and each codebook's sum of strengths.
 
-@dataclass(frozen=True)
-class Pairing:
-    """What the search chose: `glimpses` by body, as the key chose; bodies for which no track was left are missing.
-
-    `strengths` (1 + decoys,): sum over all channels read, the key's first, each under its own choice; `readings` by
-    channel name, those of the key's choice.
+    `strengths` (codebooks, channels, tracks), NaN where a pair cannot be read; channels of one body go together. With
+    decoys, strengths are compared less the median that all codebooks reach on the same pair, so that a short or
+    restless track does not draw every body.
     """
-
-    glimpses: dict[str, Glimpse]
-    strengths: Floats
-    readings: dict[str, ChannelReading]
-
-
-def search_pairs(
-    channels: Sequence[Channel],
-    glimpses: Sequence[Glimpse],
-    read: Read,
-    progress: Callable[[float], None] | None = None,
-) -> Pairing:
-    """Read every channel from every glimpse, and choose; channels of one body go together.
-
-    Strengths are compared less the median that all codebooks reach on the same pair, so that a short or restless track
-    does not draw every body. Raises MtmError when no pair can be read.
-    """
-    readings: Readings = []
-    for number, channel in enumerate(channels):
-        if progress is not None:
-            progress(number / len(channels))
-        readings.append(_read_apart([Observation(channel, glimpse) for glimpse in glimpses], read))
-    strengths = _strengths(readings)
-    levels = np.median(strengths, axis=0)
+    levels = np.zeros(strengths.shape[1:])
+    if len(strengths) > 1:
+        readable = np.isfinite(strengths).all(axis=0)
+        levels[readable] = np.median(strengths[:, readable], axis=0)
     bodies = list(dict.fromkeys(channel.body for channel in channels))
     owners = np.array([bodies.index(channel.body) for channel in channels])
     chosen, sums = choose_pairs(strengths - levels, owners)
-    own = {body: int(place) for body, place in zip(bodies, chosen[0], strict=True) if place >= 0}
-    found: dict[str, ChannelReading] = {}
+    found = {body: int(place) for body, place in zip(bodies, chosen[0], strict=True) if place >= 0}
+    # The same for all codebooks, so it changes no comparison: sums read like those of ordinary strengths.
     for row, channel in enumerate(channels):
-        result = readings[row][own[channel.body]] if channel.body in own else None
-        if isinstance(result, ChannelReading):
-            found[channel.name] = result
-            # The same for all codebooks, so it changes no comparison: sums read like those of ordinary strengths.
-            sums = sums + levels[row, own[channel.body]]
-    return Pairing({body: glimpses[place] for body, place in own.items()}, sums, found)
+        if channel.body in found:
+            sums = sums + levels[row, found[channel.body]]
+    return found, sums
 
 
 def choose_pairs(strengths: Floats, owners: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
@@ -90,30 +59,3 @@ def choose_pairs(strengths: Floats, owners: NDArray[np.int64]) -> tuple[NDArray[
                 chosen[number, body] = track
                 sums[number] += table[body, track]
     return chosen, sums
-
-
-def _read_apart(observations: Sequence[Observation], read: Read) -> list[ChannelReading | MtmError]:
-    """Read together; one by one when that is refused, so that a track too short does not take the others along."""
-    try:
-        return read(observations)
-    except MtmError as refusal:
-        if len(observations) == 1:
-            return [refusal]
-    return [_read_apart([observation], read)[0] for observation in observations]
-
-
-def _strengths(readings: Readings) -> Floats:
-    """Strengths (1 + decoys, channels, tracks) of all pairs, NaN where a pair cannot be read."""
-    read = [result for row in readings for result in row if isinstance(result, ChannelReading)]
-    if not read:
-        raise next(result for row in readings for result in row if isinstance(result, MtmError))
-    unread = np.full(1 + len(read[0].decoy_strengths), np.nan)
-    return np.stack(
-        [[all_strengths(result) if isinstance(result, ChannelReading) else unread for result in row]
-         for row in readings]
-    ).transpose(2, 0, 1)  # fmt: skip
-
-
-def all_strengths(result: ChannelReading) -> Floats:
-    """Strengths (1 + decoys,), the key's first."""
-    return np.concatenate([[result.reading.strength], result.decoy_strengths])

@@ -1,5 +1,6 @@
-"""What tracks say under a key and its decoys: each body's track is read, and the evidence of all is put together."""
+"""What tracks say under a key: each body's track is read, and the evidence of all is put together."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -7,12 +8,17 @@ from functools import partial
 import numpy as np
 
 from mtm_audit.decoding.assignment import Assignment
-from mtm_audit.decoding.pairing import Pairing, all_strengths, search_pairs
+from mtm_audit.decoding.association import Association, associate, exchanged, shown_elsewhere
 from mtm_audit.decoding.start import Start
 from mtm_audit.detectors.base import ChannelReading, Detector, Observation
 from mtm_audit.model.glimpse import Glimpse, glimpse_of_track
+from mtm_audit.model.stage import stage
 from mtm_audit.model.track import Track
-from mtm_audit.significance.decoys import Evidence, decoy_codebooks
+from mtm_audit.significance.channel_terms import channel_terms
+from mtm_audit.significance.decoys import DecoyComparison, compare, decoy_codebooks
+from mtm_audit.significance.evidence import Evidence, needed_nats
+from mtm_audit.significance.message_evidence import MessageEvidence, weigh_message
+from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.scheme import Scheme
@@ -22,20 +28,22 @@ _MOST_TICKS = 500_000
 
 # A stage's name and how far it is, 0 to 1.
 Progress = Callable[[str, float], None]
-# Reads observations under the key and all decoys, told what the stage is called.
-_Read = Callable[[Sequence[Observation], str | None], list[ChannelReading | MtmError]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Readings:
-    """`glimpses` by body; `channels` by name, those that could be read; `searched` are bodies whose track was found
-    by search.
+    """`channels` by name, those that could be read, and `refusals` why others could not; `message` the exact evidence,
+    None from a detector that gives none, and `channel_nats` by channel name; `also_shows` by track name which channel
+    its motion plays, where tracks were compared.
     """
 
-    glimpses: Mapping[str, Glimpse]
+    association: Association
     channels: Mapping[str, ChannelReading]
-    searched: frozenset[str]
+    refusals: Mapping[str, MtmError]
     evidence: Evidence
+    message: MessageEvidence | None
+    channel_nats: Mapping[str, float]
+    also_shows: Mapping[str, str]
 
 
 def read_tracks(
@@ -43,35 +51,130 @@ def read_tracks(
     key: Key,
     detector: Detector,
     decoys: int,
+    threshold: float,
     start: Start,
     progress: Progress | None = None,
 ) -> Readings:
     """Read each body's track, after a search for those bodies whose track nothing settles.
 
-    Symbols are read from all bodies together once the pairs are chosen, evidence from the settled bodies and the
-    search alone: reading together depends on what the key chose, and would favour it over its decoys. Raises MtmError
-    when no channel can be read.
+    Where channels show nothing, their tracks are exchanged among them and the better association is kept: names may
+    be wrong. Raises MtmError when no channel can be read.
     """
-    codebook, others = key.codebook(start.first_slot), decoy_codebooks(key, decoys, start.first_slot)
-
-    def read(observations: Sequence[Observation], stage: str | None) -> list[ChannelReading | MtmError]:
-        report = None if progress is None or stage is None else partial(progress, stage)
-        return detector.read(codebook, others, observations, start.onset, report)
-
+    codebooks = [key.codebook(start.first_slot), *decoy_codebooks(key, decoys, start.first_slot)]
     scheme = key.scheme
-    settled = {body: glimpse_to_search(track, scheme.rate_hz) for body, track in assignment.settled.items()}
-    first, refusals = _read_bodies(scheme, settled, read)
-    to_search = bool(assignment.unsettled and assignment.free)
-    pairing = _searched(assignment, scheme, read, progress, first) if to_search else None
-    if pairing is None:
-        if not first:
-            raise refusals[0]
-        return Readings(settled, first, frozenset(), _weigh(detector, first.values(), None))
-    glimpses, apart = settled | pairing.glimpses, first | pairing.readings
-    together, _ = _read_bodies(scheme, glimpses, read)
-    channels = {name: _with_strength_of(result, apart.get(name)) for name, result in together.items()}
-    evidence = _weigh(detector, first.values(), pairing)
-    return Readings(glimpses, channels, frozenset(pairing.glimpses), evidence)
+    settled, refused = usable_glimpses(assignment.settled.values(), scheme.rate_hz)
+    by_track = {glimpse.name: glimpse for glimpse in settled}
+    bodies = {body: by_track[track.name] for body, track in assignment.settled.items() if track.name in by_track}
+    free, more = usable_glimpses(assignment.free, scheme.rate_hz)
+    if not bodies and not free:
+        with stage("glimpse"):
+            raise next(iter([*refused, *more]))
+    association = associate(assignment, bodies, free, scheme.channels, detector, codebooks, start.onset)
+    read = _Reader(codebooks, detector, start, threshold, progress)
+    first = read.under(association)
+    if not first.channels:
+        with stage("glimpse" if refused else "timing"):
+            raise next(iter([*refused, *first.refusals.values(), *more, _nothing_to_read()]))
+    if first.message is None:
+        return first
+    return _with_better_tracks(first, free, read) or first
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Reads all channels under one association after the other."""
+
+    codebooks: Sequence[Codebook]
+    detector: Detector
+    start: Start
+    threshold: float
+    progress: Progress | None
+
+    @property
+    def scheme(self) -> Scheme:
+        """The scheme of all codebooks."""
+        return self.codebooks[0].scheme
+
+    def under(self, association: Association, also_shows: Mapping[str, str] | None = None) -> Readings:
+        """What all channels say with these tracks."""
+        observations = [
+            Observation(channel, association.glimpses[channel.body])
+            for channel in self.scheme.channels
+            if channel.body in association.glimpses
+        ]
+        report = None if self.progress is None else partial(self.progress, "reading")
+        results = self.detector.read(self.codebooks[0], self.codebooks[1:], observations, self.start.onset, report)
+        found = {
+            observation.channel.name: result
+            for observation, result in zip(observations, results, strict=True)
+            if not isinstance(result, MtmError)
+        }
+        refusals = {
+            observation.channel.name: result
+            for observation, result in zip(observations, results, strict=True)
+            if isinstance(result, MtmError)
+        }
+        message = self._message(found, association) if found else None
+        nats = {} if message is None else dict(zip(found, message.channels_nats, strict=True))
+        decoys = _compare(self.detector, self.scheme, found, association) if len(self.codebooks) > 1 and found else None
+        evidence = Evidence(None if message is None else message.presence_nats, decoys)
+        return Readings(
+            association=association, channels=found, refusals=refusals, evidence=evidence, message=message,
+            channel_nats=nats, also_shows=also_shows or {},
+        )  # fmt: skip
+
+    def _message(self, found: Mapping[str, ChannelReading], association: Association) -> MessageEvidence | None:
+        """The exact evidence, with the choice of tracks paid for; None without prepared motions."""
+        if any(result.prepared is None for result in found.values()):
+            return None
+        scheme = self.scheme
+        channels = [channel for channel in scheme.channels if channel.name in found]
+        apart = scheme.framing is not None and scheme.schedule == "rolling"
+        terms = [
+            channel_terms(self.codebooks[0], channel, found[channel.name], self.start.onset, apart=apart)
+            for channel in channels
+        ]
+        costs = [association.log_priors[channel.body] for channel in channels]
+        return weigh_message(terms, costs, scheme.message_symbols, symbols=scheme.framing is None)
+
+    def in_doubt(self, readings: Readings) -> list[str]:
+        """Bodies with a channel whose motion does not show its symbols, or that no track shows."""
+        scheme = self.scheme
+        doubtful: list[str] = []
+        for channel in scheme.channels:
+            if channel.name not in readings.channels or not self._shows(channel.name, readings):
+                doubtful.append(channel.body)
+        return list(dict.fromkeys(doubtful))
+
+    def _shows(self, name: str, readings: Readings) -> bool:
+        scheme, message = self.scheme, readings.message
+        if message is None or scheme.framing is not None or scheme.combine == "same":
+            return readings.channel_nats.get(name, -math.inf) >= math.log(1.0 / self.threshold)
+        channel = next(channel for channel in scheme.channels if channel.name == name)
+        first = scheme.first_position(channel)
+        needed = needed_nats(self.threshold, scheme.alphabet_size, scheme.message_symbols)
+        places = message.symbols[first : first + channel.symbols]
+        return all(place is not None and place.nats >= needed for place in places)
+
+
+def _with_better_tracks(first: Readings, free: Sequence[Glimpse], reader: _Reader) -> Readings | None:
+    """The readings with tracks exchanged among the channels in doubt; None when that is not better."""
+    doubtful = reader.in_doubt(first)
+    glimpses = first.association.glimpses
+    taken = {id(glimpse) for glimpse in glimpses.values()}
+    tracks = [glimpses[body] for body in doubtful if body in glimpses]
+    tracks += [glimpse for glimpse in free if id(glimpse) not in taken]
+    if not doubtful or len(first.association.glimpses) + len(tracks) < 2 or not tracks:
+        return None
+    channels, start = reader.scheme.channels, reader.start
+    strengths = reader.detector.strengths(reader.codebooks[:1], channels, tracks, start.onset)[0]
+    also = shown_elsewhere(strengths, channels, tracks, math.log(1.0 / reader.threshold))
+    better = exchanged(first.association, doubtful, tracks, channels, strengths)
+    if better is not None:
+        second = reader.under(better, also)
+        if len(second.channels) >= len(first.channels) and (second.evidence.nats or 0.0) > (first.evidence.nats or 0.0):
+            return second
+    return replace(first, also_shows=also)
 
 
 def glimpse_to_search(track: Track, rate_hz: float) -> Glimpse:
@@ -97,55 +200,21 @@ def usable_glimpses(tracks: Iterable[Track], rate_hz: float) -> tuple[list[Glimp
     return glimpses, refusals
 
 
-def _searched(
-    assignment: Assignment, scheme: Scheme, read: _Read, progress: Progress | None, first: Mapping[str, ChannelReading]
-) -> Pairing | None:
-    """The search for unsettled bodies; None when no free track can be read while the settled ones, `first`, can."""
-    glimpses, refusals = usable_glimpses(assignment.free, scheme.rate_hz)
-    channels = [channel for channel in scheme.channels if channel.body in assignment.unsettled]
-    try:
-        if not glimpses:
-            raise refusals[0]
-        report = None if progress is None else partial(progress, "matching tracks")
-        return search_pairs(channels, glimpses, lambda observations: read(observations, None), report)
-    except MtmError:
-        if not first:
-            raise
-        return None
+def _nothing_to_read() -> MtmError:
+    return MtmError("no track can be read as any channel; record longer, with the robots in sight")
 
 
-def _read_bodies(
-    scheme: Scheme, glimpses: Mapping[str, Glimpse], read: _Read
-) -> tuple[dict[str, ChannelReading], list[MtmError]]:
-    """By channel name what could be read, and why the rest could not."""
-    observations = [
-        Observation(channel, glimpses[channel.body]) for channel in scheme.channels if channel.body in glimpses
-    ]
-    results = read(observations, "reading") if observations else []
-    found: dict[str, ChannelReading] = {}
-    refusals: list[MtmError] = []
-    for observation, result in zip(observations, results, strict=True):
-        if isinstance(result, MtmError):
-            refusals.append(result)
-        else:
-            found[observation.channel.name] = result
-    return found, refusals
-
-
-def _weigh(detector: Detector, settled: Iterable[ChannelReading], pairing: Pairing | None) -> Evidence:
-    """The evidence of the mean over all channels: those settled, and those of the search under each one's choice."""
-    results = list(settled)
-    sums = np.sum([all_strengths(result) for result in results], axis=0)
-    if pairing is not None:
-        sums = sums + pairing.strengths
-        results += pairing.readings.values()
-    means = sums / len(results)
-    return detector.weigh(float(means[0]), means[1:], sum(result.reading.maxima for result in results))
-
-
-def _with_strength_of(result: ChannelReading, before: ChannelReading | None) -> ChannelReading:
-    """The reading with the strength that the evidence rests on."""
-    if before is None:
-        return result
-    reading = replace(result.reading, strength=before.reading.strength)
-    return replace(result, reading=reading, decoy_strengths=before.decoy_strengths)
+def _compare(
+    detector: Detector, scheme: Scheme, found: Mapping[str, ChannelReading], association: Association
+) -> DecoyComparison:
+    """The mean strength over all channels beside the decoys', each codebook under its own choice of tracks."""
+    results = list(found.values())
+    searched = {channel.name for channel in scheme.channels if channel.body in association.searched}
+    sums = np.zeros(1 + len(results[0].decoy_strengths))
+    if association.strengths is not None:
+        sums = sums + association.strengths
+    for name, result in found.items():
+        if association.strengths is None or name not in searched:
+            sums = sums + np.concatenate([[result.reading.strength], result.decoy_strengths])
+    maxima = sum(len(np.unique(result.reading.window_positions)) for result in results)
+    return compare(sums / len(results), detector.strength_law, maxima)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,12 @@ from mtm_audit.detectors.matched.correlate import Prepared
 from mtm_audit.model.glimpse import Glimpse
 from mtm_audit.model.timing import Onset, Timing
 from mtm_audit.model.track import Floats
-from mtm_audit.significance.decoys import Evidence
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel
+
+# How strengths are distributed without a message: as log evidence, or as means of maxima over candidates.
+StrengthLaw = Literal["log evidence", "mean of maxima"]
 
 
 @dataclass(frozen=True)
@@ -25,8 +27,7 @@ class Reading:
     together; `window_scores` (windows, M) the same for every window seen, `window_numbers` (windows,) which window from
     the onset on each is (negative ones came before it), `window_positions` (windows,) which position of the message it
     carries, `window_starts_s` (windows,) when it began. `strength` is the single number that a
-    verdict compares between the key and its decoys: larger means more evidence of any message at all. `maxima` is over
-    how many independent maxima it is a mean or sum.
+    verdict compares between the key and its decoys: larger means more evidence of any message at all.
     """
 
     timing: Timing
@@ -36,7 +37,6 @@ class Reading:
     window_positions: NDArray[np.int64]
     window_starts_s: Floats
     strength: float
-    maxima: int
 
 
 @dataclass(frozen=True)
@@ -72,6 +72,7 @@ class Detector(Protocol):
     """
 
     name: str
+    strength_law: StrengthLaw
 
     def read(
         self,
@@ -84,8 +85,13 @@ class Detector(Protocol):
         """For each observation its reading, or why it cannot be read (too short for a window)."""
         ...
 
-    def weigh(self, strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:
-        """How unlikely the strength is under the null, by the law that this detector's strengths follow."""
+    def strengths(
+        self, codebooks: Sequence[Codebook], channels: Sequence[Channel], glimpses: Sequence[Glimpse], onset: Onset
+    ) -> Floats:
+        """The strength of each channel in each glimpse under each codebook, (codebooks, channels, glimpses).
+
+        NaN where a glimpse cannot be read. Quicker than `read`: to match tracks and channels.
+        """
         ...
 
 

@@ -4,19 +4,19 @@ Appendix "Detection Pipeline Details" of the paper: Hann window, nperseg = min(1
 nfft = L, L being the window in ticks; the glimpse is resampled at each candidate rate.
 """
 
+import contextlib
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from mtm_audit.detectors.base import ChannelReading, Observation, Reading, combine_repeats, whole_windows
+from mtm_audit.detectors.base import ChannelReading, Observation, Reading, StrengthLaw, combine_repeats, whole_windows
 from mtm_audit.detectors.gcc_phat import RATE_SCALES, find_onset, find_onset_within, plan_onset_search
 from mtm_audit.detectors.welch import Complexes, mean_coherency, segment_spectra
 from mtm_audit.model.glimpse import Glimpse, tick_velocities_at_rates
 from mtm_audit.model.timing import Onset, OnsetRange, Timing
 from mtm_audit.model.track import Floats
-from mtm_audit.significance.decoys import Evidence, weigh
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel
@@ -26,6 +26,7 @@ class CoherencyDetector:
     """The paper's detector behind the common interface."""
 
     name = "coherency"
+    strength_law: StrengthLaw = "mean of maxima"
 
     def read(
         self,
@@ -102,9 +103,17 @@ class CoherencyDetector:
         shift = max(0.0, float(np.mean(reading.window_scores.max(axis=1) - centre)))
         return np.asarray(shift / variance * (reading.window_scores - centre))
 
-    def weigh(self, strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:
-        """Mean coherencies are means of maxima over many candidates and rates."""
-        return weigh(strength, decoy_strengths, maxima)
+    def strengths(
+        self, codebooks: Sequence[Codebook], channels: Sequence[Channel], glimpses: Sequence[Glimpse], onset: Onset
+    ) -> Floats:
+        """Mean best coherency of each channel in each glimpse, (codebooks, channels, glimpses); NaN where unread."""
+        result = np.full((len(codebooks), len(channels), len(glimpses)), np.nan)
+        for row, channel in enumerate(channels):
+            for column, glimpse in enumerate(glimpses):
+                with contextlib.suppress(MtmError):
+                    read = self.read_channel(codebooks, channel, glimpse, onset)
+                    result[:, row, column] = [reading.strength for reading in read]
+        return result
 
     def _score_group(
         self,
@@ -166,7 +175,7 @@ def _reading(timing: Timing, scores: Floats, numbers: NDArray[np.int64], starts_
     combined = combine_repeats(scores, positions, symbols)
     seen = np.isin(np.arange(symbols), positions)
     strength = float(combined[seen].max(axis=1).mean())
-    return Reading(timing, combined, scores, numbers, positions, starts_s, strength, int(seen.sum()))
+    return Reading(timing, combined, scores, numbers, positions, starts_s, strength)
 
 
 def _reference_spectra(codebooks: Sequence[Codebook], channel: Channel, window: int) -> list[Complexes]:

@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime
 
-from mtm_audit.decoding.decode import Decoding
+from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.decoding.frames import Delivered
 from mtm_onboard.protocol.framing import Payload
 from mtm_onboard.protocol.slots import slot_start_unix_s

@@ -1,18 +1,20 @@
 """The decode as JSON, for programs; docs/decode-json.md describes it and decode.schema.json checks it."""
 
 import json
+import math
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from mtm_audit.decoding.decode import CERTAIN, ChannelDecoding, Decoding
+from mtm_audit.decoding.decoding import ChannelDecoding, Decoding
 from mtm_audit.decoding.frames import Delivered
 from mtm_audit.model.recording import Recording
 from mtm_audit.reporting.text import message_bits
+from mtm_audit.significance.decoys import DecoyComparison
 from mtm_onboard.protocol.slots import slot_start_unix_s
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, ...]) -> str:
@@ -28,13 +30,10 @@ def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, .
         "symbols": _symbols(decoding),
         "p_value": evidence.p_value,
         "threshold": decoding.settings.threshold,
-        "strength": evidence.strength,
-        "evidence_bits": decoding.evidence_bits,
-        "decoys": {
-            "count": len(evidence.decoy_strengths),
-            "mean": float(np.mean(evidence.decoy_strengths)),
-            "sd": float(np.std(evidence.decoy_strengths, ddof=1)),
-        },
+        "exact": evidence.nats is not None,
+        "evidence_bits": evidence.bits,
+        "symbol_bits_needed": None if evidence.nats is None else _bits(decoding.needed_nats),
+        "decoys": _decoys(evidence.decoys),
         "key_id": decoding.key_id,
         "scheme": {"name": scheme.name, "fingerprint": scheme.fingerprint},
         "detector": decoding.settings.detector,
@@ -75,14 +74,33 @@ def _symbols(decoding: Decoding) -> list[dict[str, Any]]:
     """Empty when no message is there: symbols of chance must not look like one."""
     if decoding.verdict == "absent":
         return []
-    posteriors = [
-        None if symbol is None else float(decoding.posteriors[place, symbol])
+    return [
+        {
+            "symbol": symbol,
+            "posterior": None if symbol is None else float(decoding.posteriors[place, symbol]),
+            "bits": _bits(decoding.symbol_nats[place]),
+            "certain": place not in decoding.uncertain,
+        }
         for place, symbol in enumerate(decoding.symbols)
     ]
-    return [
-        {"symbol": symbol, "posterior": posterior, "certain": posterior is not None and posterior >= CERTAIN}
-        for symbol, posterior in zip(decoding.symbols, posteriors, strict=True)
-    ]
+
+
+def _decoys(comparison: DecoyComparison | None) -> dict[str, Any] | None:
+    """The comparison with decoy keys; None when none were searched."""
+    if comparison is None:
+        return None
+    strengths = comparison.decoy_strengths
+    return {
+        "count": len(strengths),
+        "strength": comparison.strength,
+        "mean": float(np.mean(strengths)),
+        "sd": float(np.std(strengths, ddof=1)),
+        "p_value": comparison.p_value,
+    }
+
+
+def _bits(nats: float | None) -> float | None:
+    return None if nats is None else nats / math.log(2.0)
 
 
 def _channel(decoding: ChannelDecoding) -> dict[str, Any]:
@@ -92,6 +110,9 @@ def _channel(decoding: ChannelDecoding) -> dict[str, Any]:
         "body": channel.body,
         "track": None if glimpse is None else glimpse.name,
         "track_searched": decoding.searched,
+        "track_exchanged": decoding.exchanged,
+        "state": decoding.state,
+        "evidence_bits": _bits(decoding.nats),
         "onset_s": decoding.onset_s,
         "rate_hz": None if reading is None else reading.timing.rate_hz,
         "windows": 0 if reading is None else len(reading.window_positions),

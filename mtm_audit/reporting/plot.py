@@ -1,5 +1,6 @@
-"""One picture of a decode: where the robots went, what each symbol scored, and how the key compares with its decoys."""
+"""One picture of a decode: where the robots went, what each symbol scored, and how much evidence there is."""
 
+import math
 import os
 import tempfile
 from pathlib import Path
@@ -11,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import MaxNLocator
 
-from mtm_audit.decoding.decode import Decoding
+from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.model.recording import Recording
 from mtm_audit.model.track import Floats, Track
 from mtm_audit.reporting.text import chance_sentence, verdict_sentence
@@ -53,7 +54,10 @@ def draw_plot(recording: Recording, decoding: Decoding, path: Path) -> None:
     (tracks, scores), (decoys, margins) = figure.subplots(2, 2, height_ratios=(1.25, 1.0))
     _draw_tracks(tracks, recording.tracks)
     _draw_scores(scores, decoding)
-    _draw_decoys(decoys, decoding)
+    if decoding.evidence.nats is not None:
+        _draw_bits(decoys, decoding)
+    else:
+        _draw_decoys(decoys, decoding)
     _draw_margins(margins, decoding)
     with replacing(path) as temporary:
         figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
@@ -104,15 +108,47 @@ def _draw_scores(axes: Axes, decoding: Decoding) -> None:
 
 
 def _draw_decoys(axes: Axes, decoding: Decoding) -> None:
-    evidence = decoding.evidence
-    axes.hist(
-        evidence.decoy_strengths, bins="auto", color=_QUIET, edgecolor="#8593a6", linewidth=0.6, label="decoy keys"
-    )
-    axes.axvline(evidence.strength, color=_VERDICT_COLOURS[decoding.verdict], linewidth=3.0, label="this key")
+    decoys = decoding.evidence.decoys
+    if decoys is None:
+        return
+    axes.hist(decoys.decoy_strengths, bins="auto", color=_QUIET, edgecolor="#8593a6", linewidth=0.6, label="decoy keys")
+    axes.axvline(decoys.strength, color=_VERDICT_COLOURS[decoding.verdict], linewidth=3.0, label="this key")
     axes.set(title="This key against keys that nobody holds", xlabel="strength of the best message", ylabel="keys")
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     _legend_below(axes)
     _tidy(axes)
+
+
+def _draw_bits(axes: Axes, decoding: Decoding) -> None:
+    """Evidence of each symbol beside what it needs; without a message no bar is drawn that could look like one."""
+    needed = decoding.needed_nats / math.log(2.0)
+    names, bits = _symbol_bits(decoding)
+    rows = np.arange(len(names))
+    if decoding.verdict == "absent":
+        axes.text(0.5, 0.5, "no evidence of a message of this key", ha="center", va="center", color="#475467",
+                  transform=axes.transAxes)  # fmt: skip
+        bits = np.zeros(len(names))
+    colours = [_KEY_COLOUR if value >= needed else _QUIET for value in bits]
+    axes.barh(rows, bits, color=colours, height=0.62)
+    axes.axvline(needed, color=_VERDICT_COLOURS[decoding.verdict], linewidth=2.0, label=f"needed: {needed:.1f} bits")
+    axes.set(title="Evidence for each symbol", xlabel="bits")
+    axes.set_xlim(min(0.0, float(bits.min(initial=0.0))), 1.15 * max(needed, float(bits.max(initial=0.0))))
+    axes.invert_yaxis()
+    _legend_below(axes)
+    _name_places(axes, names)
+    _tidy(axes)
+
+
+def _symbol_bits(decoding: Decoding) -> tuple[list[str], Floats]:
+    """Places of the message by name and their bits of evidence; channels where a frame has a check of its own."""
+    if decoding.scheme.framing is not None:
+        channels = [(item.channel.name, item.nats) for item in decoding.channels]
+        return [name for name, _ in channels], np.array([(nats or 0.0) / math.log(2.0) for _, nats in channels])
+    names = []
+    for channel in decoding.scheme.channels[: 1 if decoding.scheme.combine == "same" else None]:
+        count = channel.symbols
+        names += [channel.name if count == 1 else f"{channel.name}.{place}" for place in range(count)]
+    return names, np.array([(nats or 0.0) / math.log(2.0) for nats in decoding.symbol_nats])
 
 
 def _draw_margins(axes: Axes, decoding: Decoding) -> None:

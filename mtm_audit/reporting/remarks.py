@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from mtm_audit.decoding.decode import ChannelDecoding, Decoding
+from mtm_audit.decoding.decoding import ChannelDecoding, Decoding
 from mtm_audit.model.recording import Recording
+from mtm_audit.reporting.advice import advice
 
 _RATE_TOLERANCE = 0.02
 _GAP_SHARE = 0.2
@@ -14,7 +15,7 @@ def remarks(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
     found = [*recording.warnings, *_of_the_recording(recording, decoding)]
     for channel in decoding.channels:
         found += _of_a_channel(channel, decoding)
-    return tuple(found)
+    return (*found, *advice(recording, decoding))
 
 
 def _of_the_recording(recording: Recording, decoding: Decoding) -> list[str]:
@@ -31,8 +32,6 @@ def _of_the_recording(recording: Recording, decoding: Decoding) -> list[str]:
             f"{rate_hz:.1f} observations a second are too few for a band up to {scheme.band_hz[1]:g} Hz; record with "
             f"at least {needed_hz:g}"
         )
-    if decoding.verdict != "absent" and not decoding.order_known and decoding.message is None:
-        found.append("the message repeats, and nothing shows which of its symbols comes first; give --onset")
     return found
 
 
@@ -48,7 +47,14 @@ def _of_a_channel(decoding: ChannelDecoding, whole: Decoding) -> list[str]:
             f"{channel.body} was out of sight for {missed:.0%} of the time between its first and last sighting"
         )
     if reading is None:
-        return [*found, f"track {glimpse.name} is too short to read channel {channel.name}; record longer"]
+        return [*found, decoding.refusal or f"track {glimpse.name} is too short to read channel {channel.name}"]
+    if decoding.exchanged and whole.verdict != "absent":
+        found.append(
+            f"{channel.body} is the track {glimpse.name}, though names say otherwise: its motion plays channel "
+            f"{channel.name}"
+        )
+    if decoding.also_shows and whole.verdict != "absent":
+        found.append(f"track {glimpse.name} plays channel {decoding.also_shows}, which is not that of {channel.body}")
     nominal_hz = whole.scheme.rate_hz
     # Without a message the rate found is that of chance.
     if whole.verdict != "absent" and abs(reading.timing.rate_hz / nominal_hz - 1.0) > _RATE_TOLERANCE:

@@ -1,20 +1,23 @@
 """A decode told stage by stage, and at which stage it failed and why."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from mtm_audit.decoding.assignment import assign_tracks
-from mtm_audit.decoding.decode import CERTAIN, ChannelDecoding, DecodeSettings, Decoding
-from mtm_audit.decoding.readings import usable_glimpses
+from mtm_audit.decoding.decoding import ChannelDecoding, Decoding
 from mtm_audit.model.recording import Recording
-from mtm_audit.model.track import Track
 from mtm_audit.reporting.delivery import frame_sentences
-from mtm_audit.reporting.text import chance_sentence, evidence_sentence, percent, recording_line, verdict_sentence
-from mtm_onboard.protocol.errors import MtmError
+from mtm_audit.reporting.text import (
+    chance_sentence,
+    decoys_sentence,
+    evidence_sentence,
+    percent,
+    recording_line,
+    verdict_sentence,
+)
 from mtm_onboard.protocol.framing import payload_bits
-from mtm_onboard.protocol.scheme import Scheme
 
 _TRY = {
     "key": "make one with mtm-onboard keygen, or name the file that the robot was provisioned with",
@@ -57,17 +60,6 @@ def stages_of_recording(recording: Recording) -> list[Stage]:
         for track in recording.tracks
     )
     return [Stage("recording", (recording_line(recording), *recording.warnings)), Stage("tracks", tracks)]
-
-
-def failed_stage(tracks: Sequence[Track], scheme: Scheme, settings: DecodeSettings) -> str:
-    """At which stage a decode of these tracks was refused."""
-    try:
-        assignment = assign_tracks(scheme, tracks, settings.assignment)
-    except MtmError:
-        return "tracks"
-    settled, refusals = usable_glimpses(assignment.settled.values(), scheme.rate_hz)
-    searched, _ = usable_glimpses(assignment.free, scheme.rate_hz)
-    return "timing" if not refusals and (settled or searched) else "glimpse"
 
 
 def stages_of_decoding(decoding: Decoding) -> list[Stage]:
@@ -129,23 +121,26 @@ def _detector_lines(decoding: Decoding) -> tuple[str, ...]:
                 f"{channel.channel.name}: {windows} windows, best score {float(ranked[:, -1].mean()):.3f}, "
                 f"{margin:.3f} ahead of the next"
             )
-    decoys = decoding.evidence.decoy_strengths
-    lines.append(
-        f"{decoding.settings.detector}: strength {decoding.evidence.strength:.4f}; {len(decoys)} decoy keys "
-        f"{float(decoys.mean()):.4f} ± {float(decoys.std(ddof=1)):.4f}"
-    )
-    lines.append(evidence_sentence(decoding))
+    lines.append(f"{decoding.settings.detector}: {evidence_sentence(decoding)}")
+    lines += [line for line in [decoys_sentence(decoding)] if line]
     return tuple(lines)
 
 
 def _symbol_lines(decoding: Decoding) -> tuple[str, ...]:
     said = [
-        "?" if symbol is None else f"{symbol} ({percent(float(decoding.posteriors[place, symbol]))})"
+        "?" if symbol is None else f"{symbol} ({_sure(decoding, place)})"
         for place, symbol in enumerate(decoding.symbols)
     ]
     doubt = decoding.uncertain
-    state = f"{len(doubt)} of {len(said)} are below {CERTAIN:.0%}" if doubt else f"all of {len(said)} are certain"
+    state = f"{len(doubt)} of {len(said)} are not certain" if doubt else f"all of {len(said)} are certain"
     return (f"{state}: {', '.join(said)}",) if doubt else (", ".join(said), state)
+
+
+def _sure(decoding: Decoding, place: int) -> str:
+    nats, symbol = decoding.symbol_nats[place], decoding.symbols[place]
+    if nats is not None:
+        return f"{nats / math.log(2.0):.1f} bits"
+    return percent(0.0 if symbol is None else float(decoding.posteriors[place, symbol]))
 
 
 def _message_line(decoding: Decoding) -> str:

@@ -1,5 +1,6 @@
 """The decode as a person reads it: verdict first, then what it rests on."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -7,9 +8,8 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from mtm_audit.decoding.decode import CERTAIN, ChannelDecoding, Decoding
+from mtm_audit.decoding.decoding import ChannelDecoding, Decoding
 from mtm_audit.model.recording import Recording
-from mtm_audit.reporting.advice import advice
 from mtm_audit.reporting.delivery import clock_sentence, frame_sentences, payload_text
 from mtm_onboard.protocol.framing import payload_bits
 
@@ -40,8 +40,23 @@ def message_bits(decoding: Decoding) -> str | None:
 
 
 def chance_sentence(decoding: Decoding) -> str:
+    """How often the verdict can be wrong, in one line."""
+    evidence, threshold = decoding.evidence, decoding.settings.threshold
+    if evidence.nats is None:
+        return _decoy_sentence(decoding)
+    if decoding.verdict == "decoded":
+        odds = f"{1.0 / threshold:,.0f}"
+        return f"Wrong at most once in {odds}, for any robot, camera and interference; keys drawn at random."
+    found = (
+        "no more than any recording" if evidence.p_value >= 1.0 else f"as much as at most {rarity(evidence.p_value)}"
+    )
+    return f"It shows {found} without a message of this key; the limit is {rarity(threshold)}."
+
+
+def _decoy_sentence(decoding: Decoding) -> str:
     """The p-value in words, and what it is estimated from."""
-    evidence, decoys = decoding.evidence, len(decoding.evidence.decoy_strengths)
+    evidence = decoding.evidence
+    decoys = 0 if evidence.decoys is None else len(evidence.decoys.decoy_strengths)
     basis = f"judged by {decoys} decoy keys"
     if evidence.p_value < 1.0 / decoys:
         basis = f"extrapolated from {decoys} decoy keys"
@@ -53,8 +68,24 @@ def chance_sentence(decoding: Decoding) -> str:
 
 def evidence_sentence(decoding: Decoding) -> str:
     """The evidence in bits, and what that means."""
-    meaning = "log-likelihood ratio of the best message against none" if decoding.evidence.in_nats else "-log2 p"
-    return f"{decoding.evidence_bits:.1f} bits of evidence for a message of this key ({meaning})"
+    evidence = decoding.evidence
+    if evidence.nats is None:
+        return f"{evidence.bits:.1f} bits of evidence for a message of this key (-log2 p)"
+    needed = math.log2(1.0 / decoding.settings.threshold)
+    return f"{evidence.bits:.1f} bits for a message of this key, {needed:.1f} are needed"
+
+
+def decoys_sentence(decoding: Decoding) -> str | None:
+    """What decoys say beside exact evidence; None when none were asked for."""
+    evidence = decoding.evidence
+    if evidence.nats is None or evidence.decoys is None:
+        return None
+    strengths = evidence.decoys.decoy_strengths
+    return (
+        f"strength {_score(evidence.decoys.strength)} beside {_score(float(np.mean(strengths)))} ± "
+        f"{_score(float(np.std(strengths, ddof=1)))} of {len(strengths)} decoy keys, about "
+        f"{rarity(evidence.decoys.p_value)}"
+    )
 
 
 def search_sentence(recording: Recording, decoding: Decoding) -> str | None:
@@ -62,7 +93,7 @@ def search_sentence(recording: Recording, decoding: Decoding) -> str | None:
     found = {item.channel.body: item.glimpse.name for item in decoding.channels if item.searched and item.glimpse}
     if not found:
         return None
-    among = f"among {len(recording.tracks)} tracks, as were those of the decoy keys"
+    among = f"among {len(recording.tracks)} tracks, which is paid for"
     if decoding.verdict == "absent":
         return f"Which track shows {', '.join(found)} was searched {among}; without a message the pairs are chance."
     pairs = ", ".join(f"{body} is {track}" for body, track in found.items())
@@ -90,7 +121,6 @@ def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str]) -
                 *frame_sentences(decoding),
                 clock_sentence(decoding),
                 search_sentence(recording, decoding),
-                *advice(recording, decoding),
             )
             if sentence
         ),
@@ -99,6 +129,7 @@ def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str]) -
         Text(f"scheme     {scheme.name} (fingerprint {scheme.fingerprint})"),
         Text(f"recording  {recording_line(recording)}"),
         Text(f"evidence   {evidence_sentence(decoding)}"),
+        *(Text(f"decoys     {line}") for line in [decoys_sentence(decoding)] if line),
         *(Text(line) for line in [_frame_line(decoding)] if line),
         Text(""),
         _table_of(decoding),
@@ -146,39 +177,56 @@ def _frame_line(decoding: Decoding) -> str | None:
 
 
 def _symbol_table(decoding: Decoding) -> Table:
-    table = _table("channel", "track", "start s", "rate Hz", "windows", "symbol", "sure", "best", "next", "margin")
+    exact = decoding.evidence.nats is not None
+    sure = ("bits", "needed") if exact else ("sure",)
+    table = _table("channel", "track", "start s", "rate Hz", "windows", "symbol", *sure, "best", "next", "margin")
     for channel in decoding.channels:
         first = decoding.scheme.first_position(channel.channel)
         reading, head = channel.reading, [channel.channel.name, _track_name(channel)]
         if reading is None:
-            table.add_row(*head, "-", "-", "0", "-", "-", "-", "-", "-")
+            table.add_row(*head, "-", "-", "0", channel.state, *["-"] * (len(sure) + 3))
             continue
         head += [f"{channel.onset_s:.2f}", f"{reading.timing.rate_hz:.2f}"]
         for position in range(channel.channel.symbols):
             windows = int(np.sum(reading.window_positions == position))
-            symbol = decoding.symbols[first + position]
-            posterior = 0.0 if symbol is None else float(decoding.posteriors[first + position, symbol])
+            place = first + position
+            doubt = " ?" if place in decoding.uncertain else ""
             best, runner_up = (float(score) for score in np.sort(reading.scores[position])[:-3:-1])
-            doubt = "" if posterior >= CERTAIN else " ?"
             table.add_row(
                 *(head if position == 0 else [""] * len(head)),
-                str(windows), f"{symbol}{doubt}", percent(posterior),
+                str(windows), f"{decoding.symbols[place]}{doubt}", *_sureness(decoding, place),
                 _score(best), _score(runner_up), _score(best - runner_up),
             )  # fmt: skip
     return table
 
 
+def _sureness(decoding: Decoding, place: int) -> tuple[str, ...]:
+    """A symbol's bits and the bits it needs, or its posterior where there is no exact evidence."""
+    symbol, nats = decoding.symbols[place], decoding.symbol_nats[place]
+    if decoding.evidence.nats is None:
+        return (percent(0.0 if symbol is None else float(decoding.posteriors[place, symbol])),)
+    found = "-" if nats is None else f"{nats / math.log(2.0):.1f}"
+    return found, f"{decoding.needed_nats / math.log(2.0):.1f}"
+
+
 def _absent_table(decoding: Decoding) -> Table:
     """Without symbols: those of a recording without a message would be chance, and would look like one."""
+    evidence, decoys = decoding.evidence, decoding.evidence.decoys
+    if evidence.nats is not None or decoys is None:
+        table = _table("channel", "track", "windows", "seen")
+        for channel in decoding.channels:
+            windows = 0 if channel.reading is None else len(channel.reading.window_positions)
+            seen = "yes" if channel.reading is not None else channel.state
+            table.add_row(channel.channel.name, _track_name(channel), str(windows), seen)
+        return table
     table = _table("channel", "track", "windows", "this key", "decoy keys")
     for channel in decoding.channels:
         windows = 0 if channel.reading is None else len(channel.reading.window_positions)
         strength = "-" if channel.reading is None else _score(channel.reading.strength)
         table.add_row(channel.channel.name, _track_name(channel), str(windows), strength, "")
-    evidence = decoding.evidence
-    mean, spread = float(np.mean(evidence.decoy_strengths)), float(np.std(evidence.decoy_strengths, ddof=1))
+    mean, spread = float(np.mean(decoys.decoy_strengths)), float(np.std(decoys.decoy_strengths, ddof=1))
     table.add_section()
-    table.add_row("together", "", "", _score(evidence.strength), f"{_score(mean)} ± {_score(spread)}")
+    table.add_row("together", "", "", _score(decoys.strength), f"{_score(mean)} ± {_score(spread)}")
     return table
 
 

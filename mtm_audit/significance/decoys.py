@@ -1,18 +1,14 @@
-"""The verdict: how unlikely the evidence would be if no message of this key were there."""
+"""How a key's strength compares with those of keys that nobody holds, for detectors that know no exact law."""
 
-import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
-from scipy import stats
 
+from mtm_audit.detectors.base import StrengthLaw
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.keystream import SECRET_BYTES, stream
-
-VerdictName = Literal["decoded", "absent", "inconclusive"]
 
 # Skewness of the Gumbel distribution, the limit of a maximum over many candidates.
 _GUMBEL_SKEW = 1.1395
@@ -23,26 +19,12 @@ _LEAST_TAIL = 1e-300
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """The key's strength beside that of its decoys, and the p-value that follows.
-
-    `in_nats` when strengths are log evidences against a recording without a message.
-    """
+class DecoyComparison:
+    """The key's strength beside that of its decoys (decoys,), and the p-value that follows."""
 
     strength: float
     decoy_strengths: Floats
     p_value: float
-    in_nats: bool = False
-
-    def bits(self, channels: int) -> float:
-        """The evidence of `channels` channels, over which the strength is a mean, in bits.
-
-        A log evidence is added up over the channels and may be negative; any other strength counts as much as its
-        p-value, -log2 of it.
-        """
-        if self.in_nats:
-            return self.strength * channels / math.log(2.0)
-        return -math.log2(max(self.p_value, _LEAST_TAIL))
 
 
 def decoy_codebooks(key: Key, count: int, first_slot: int = 0) -> list[Codebook]:
@@ -53,7 +35,18 @@ def decoy_codebooks(key: Key, count: int, first_slot: int = 0) -> list[Codebook]
     ]
 
 
-def weigh_log_evidence(strength: float, decoy_strengths: Floats) -> Evidence:
+def compare(strengths: Floats, law: StrengthLaw, maxima: int) -> DecoyComparison:
+    """Compare strengths (1 + decoys,), the key's first, by the law that they follow without a message.
+
+    `maxima` is over how many independent maxima each is a mean.
+    """
+    strength, decoys = float(strengths[0]), strengths[1:]
+    if law == "log evidence":
+        return weigh_log_evidence(strength, decoys)
+    return weigh_mean_of_maxima(strength, decoys, maxima)
+
+
+def weigh_log_evidence(strength: float, decoy_strengths: Floats) -> DecoyComparison:
     """Compare a log evidence with its decoys', whatever the shape of its law.
 
     Among the decoys the key's rank gives the p-value, which is exact because under the null the key is one of them.
@@ -68,31 +61,35 @@ def weigh_log_evidence(strength: float, decoy_strengths: Floats) -> Evidence:
     if strength > threshold:
         mean = max(float(np.mean(falling[:excesses] - threshold)), 1e-300)
         beyond = (1.0 + (strength - threshold) / (excesses * mean)) ** -excesses
-        return Evidence(strength, decoy_strengths, float((excesses + 1) / (count + 1) * beyond), in_nats=True)
+        return DecoyComparison(strength, decoy_strengths, float((excesses + 1) / (count + 1) * beyond))
     # Between two decoys the rank is interpolated; below the last one the range of them all is taken to go on.
     points = np.concatenate([falling, [falling[-1] - np.ptp(falling) - 1e-300]])
     rank = float(np.interp(-strength, -points, np.arange(1, count + 2)))
-    return Evidence(strength, decoy_strengths, rank / (count + 1), in_nats=True)
+    return DecoyComparison(strength, decoy_strengths, rank / (count + 1))
 
 
-def weigh(strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:
+def weigh_mean_of_maxima(strength: float, decoy_strengths: Floats, maxima: int) -> DecoyComparison:
     """Compare the key's strength with its decoys'.
 
     Strengths are means of `maxima` maxima over candidates, so under the null they follow a Gumbel-like law whose
     skewness shrinks with the square root of that number. Location and scale are fitted to the decoys; that they
     are estimates from n decoys is paid for by Student's t with n - 1 degrees of freedom.
     """
+    from scipy import stats
+
     count = len(decoy_strengths)
     centre, spread = float(np.mean(decoy_strengths)), float(np.std(decoy_strengths, ddof=1))
     standard = (strength - centre) / max(spread, 1e-300)
     skew = _GUMBEL_SKEW / np.sqrt(max(1, maxima))
     normal = _normal_of_skewed(standard, skew)
     p_value = float(stats.t.sf(normal / np.sqrt(1.0 + 1.0 / count), count - 1))
-    return Evidence(strength, decoy_strengths, p_value)
+    return DecoyComparison(strength, decoy_strengths, p_value)
 
 
 def _normal_of_skewed(standard: float, skew: float) -> float:
     """The standard normal quantile of the same probability as `standard` under a Pearson III law of that skew."""
+    from scipy import stats
+
     # Each tail from its own side: the other one rounds to one, and the law itself ends somewhere below its mean.
     upper, lower = stats.pearson3.sf(standard, skew), stats.pearson3.cdf(standard, skew)
     if upper < lower:

@@ -55,12 +55,15 @@ class MessageEvidence:
     symbols: tuple[SymbolEvidence | None, ...]
 
 
-def weigh_message(channels: Sequence[ChannelTerms], positions: int, *, symbols: bool = True) -> MessageEvidence:
+def weigh_message(
+    channels: Sequence[ChannelTerms], costs: Sequence[float], positions: int, *, symbols: bool = True
+) -> MessageEvidence:
     """What the channels that could be read say together of a message of so many positions.
 
-    Without `symbols` only presence is weighed: a frame's symbols have a check of their own.
+    `costs` are log prior probabilities of the track that was chosen for each channel. Without `symbols` only presence
+    is weighed: a frame's symbols have a check of their own.
     """
-    own = [_Own(channel, channel.at(channel.timing)) for channel in channels]
+    own = [_Own(channel, channel.at(channel.timing), cost) for channel, cost in zip(channels, costs, strict=True)]
     found: list[SymbolEvidence | None] = [None] * positions
     for position in range(positions if symbols else 0):
         showing = [row for row, channel in enumerate(channels) if position in channel.shown]
@@ -75,6 +78,7 @@ class _Own:
 
     channel: ChannelTerms
     terms: Terms
+    cost: float
 
     @cached_property
     def chosen(self) -> tuple[Hypotheses, Floats]:
@@ -90,7 +94,7 @@ class _Own:
     def nats(self) -> float:
         """Log e-value of any message on this channel."""
         chosen, log_priors = self.chosen
-        return float(logsumexp(self.terms.exact_presence(chosen) + log_priors))
+        return float(logsumexp(self.terms.exact_presence(chosen) + log_priors)) + self.cost
 
     @cached_property
     def exact(self) -> Floats:
@@ -136,7 +140,8 @@ def _presence(own: Sequence[_Own]) -> float:
     tables = [channel.at(_anchor(channels, channel)) for channel in channels]
 
     def together(values: Sequence[Floats]) -> Floats:
-        return np.asarray(np.sum([_blurred(value, nats) for value, nats in zip(values, apart, strict=True)], axis=0))
+        blurred = [_blurred(value + item.cost, item.nats) for value, item in zip(values, own, strict=True)]
+        return np.asarray(np.sum(blurred, axis=0))
 
     coarse = [logsumexp(channel.mixed(terms.coarse).sum(axis=-1), axis=(1, 2)) - np.log(terms.coarse[0, ..., 0, 0].size)
               for channel, terms in zip(channels, tables, strict=True)]  # fmt: skip
@@ -159,8 +164,13 @@ def _symbol(own: Sequence[_Own], showing: Sequence[int], position: int) -> Symbo
     """The best of the candidates tried; every channel of `showing` carries the position."""
     channel = own[showing[0]].channel
     row = channel.shown.index(position)
-    tried = channel.candidates[row][:_TRIED].tolist()
-    found = [SymbolEvidence(symbol, _symbol_nats(own, showing, position, symbol)) for symbol in tried]
+    cost = sum(own[number].cost for number in showing)
+    found: list[SymbolEvidence] = []
+    for symbol in channel.candidates[row][:_TRIED].tolist():
+        found.append(SymbolEvidence(symbol, _symbol_nats(own, showing, position, symbol) + cost))
+        # Where one says something no other can say as much.
+        if found[-1].nats > 0.0:
+            break
     return max(found, key=lambda item: item.nats)
 
 

@@ -21,7 +21,8 @@ from hil.sensors.motion_capture import MotionCapture
 from hil.sensors.optics import Optics
 from hil.worlds.errands import any_errand
 from hil.worlds.robomaster import ROBOTS, fleet_scheme
-from mtm_audit.decoding.decode import DecodeSettings, decode_tracks
+from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.track import Floats, Track
 from mtm_onboard.protocol import Channel, Key, Scheme
 

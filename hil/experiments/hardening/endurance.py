@@ -25,10 +25,9 @@ from hil.vehicles.motion_controller import MotionController
 from hil.wires.can_line import can_line
 from hil.worlds.errands import ERRANDS
 from hil.worlds.robomaster import Route
-from mtm_audit.detectors import make_detector
-from mtm_audit.detectors.base import Observation
-from mtm_audit.model.glimpse import glimpse_of_track
-from mtm_audit.significance.decoys import decoy_codebooks
+from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.decoding.settings import DecodeSettings
+from mtm_audit.model.recorded_at import RecordedAt
 from mtm_onboard.journal.journal import DEFAULT_MAX_BYTES, Journal, JournalHeader
 from mtm_onboard.links.reconnecting import ReconnectingTransport
 from mtm_onboard.links.robomaster_can import RoboMasterCan
@@ -52,7 +51,6 @@ _SCHEME = Scheme(
 )  # fmt: skip
 _KEY = Key("endurance", b"simulated, so this is no secret.", _SCHEME)
 _MIDNIGHT_UNIX_S = 20_000.0 * EPOCH_S
-_DECOYS = 20
 _FILM_SAMPLES = round(FILM_S / SAMPLE_PERIOD_S)
 
 
@@ -199,14 +197,10 @@ def _read(film: Floats, begin_unix_s: float, seed: int, detector_name: str) -> t
     (track,) = capture(MotionCapture(), [trajectory], np.random.default_rng(seed))
     slot = next_slot(begin_unix_s, _SCHEME)
     onset_s = slot_start_unix_s(slot, _SCHEME) - begin_unix_s
-    detector = make_detector(detector_name)
-    observation = Observation(_SCHEME.channels[0], glimpse_of_track(track))
-    (result,) = detector.read(_KEY.codebook(slot), decoy_codebooks(_KEY, _DECOYS, slot), [observation], onset_s)
-    if isinstance(result, MtmError):
-        raise result
-    reading = result.reading
-    evidence = detector.weigh(reading.strength, result.decoy_strengths, reading.maxima)
-    return int(np.sum(np.argmax(reading.scores, axis=1) == SYMBOLS)), evidence.p_value
+    settings = DecodeSettings(detector=detector_name, onset_s=onset_s, at=RecordedAt(begin_unix_s))
+    decoding = decode_tracks([track], _KEY, settings)
+    right = sum(read == sent for read, sent in zip(decoding.symbols, SYMBOLS, strict=True))
+    return right, decoding.evidence.p_value
 
 
 def _resident_bytes() -> int:

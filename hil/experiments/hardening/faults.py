@@ -30,7 +30,8 @@ from hil.sensors.motion_capture import MotionCapture, capture
 from hil.sensors.poses import Trajectory
 from hil.wires.faulty_wire import WireFaults
 from hil.worlds.robomaster import fleet_scheme
-from mtm_audit.decoding.decode import DecodeSettings, decode_tracks
+from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.decoding.settings import DecodeSettings
 from mtm_onboard.model.velocity import STOP
 from mtm_onboard.protocol import Channel, Key
 from mtm_onboard.protocol.journal_file import NOISE, UNSENT, JournalRecord
@@ -199,6 +200,6 @@ def _decoded(run: FaultRun, key: Key, draw: np.random.Generator) -> dict[str, Sc
     times_s = np.arange(len(run.motion), dtype=np.float64) * SAMPLE_PERIOD_S
     trajectory = Trajectory("robot0", times_s, run.motion[:, :2], run.motion[:, 2])
     tracks = capture(MotionCapture(), [trajectory], draw, end_s=SILENT_S)
-    decoding = decode_tracks(tracks, key, DecodeSettings("matched", onset_s=START_S))
+    decoding = decode_tracks(tracks, key, DecodeSettings(onset_s=START_S))
     is_decoded = decoding.verdict == "decoded" and decoding.symbols == _SYMBOLS
     return {"is_decoded": is_decoded, "p_value": decoding.evidence.p_value}

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from scipy import fft
 from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, log_sum_exp
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import NoiseModel, power_response, whitened
-from mtm_audit.detectors.matched.plants import MEMORY_S, TAIL_S, plant_family, tone_responses
+from mtm_audit.detectors.matched.plants import MEMORY_S, TAIL_S, Complexes, plant_family, tone_responses
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel
@@ -68,23 +69,35 @@ def hear(prepared: Prepared, codebook: Codebook, channel: Channel, rate_hz: floa
     length_s = ticks / rate_hz
     tones_hz = codebook.bins(channel) * (rate_hz / ticks)
     cells = int(np.ceil((length_s + TAIL_S) / motion.step_s))
-    response = tone_responses(_TYPICAL, tones_hz, (np.arange(cells) + 0.5) * motion.step_s, length_s)[0]
     count = len(motion.seen)
     lags = count + lead
     size = fft.next_fast_len(count + lead + cells)
+    kernel, settled = _kernel(tuple(tones_hz.tolist()), cells, motion.step_s, length_s, size)
     shifted = np.zeros((len(prepared.filtered), size))
     shifted[:, lead : lead + count] = prepared.filtered
     # Correlation: the sum over cells of shifted[lag + cell] times response[cell].
-    kernel = fft.fft(response[:, ::-1], size, axis=-1)
     crossed = fft.fft(shifted, axis=-1)[:, None] * kernel[None]
     heard = fft.ifft(crossed, axis=-1)[..., cells - 1 : cells - 1 + lags]
     projections = np.concatenate([heard.real, heard.imag], axis=1).astype(np.float32)
     weights = np.zeros((len(prepared.weights), size))
     weights[:, lead : lead + count] = prepared.weights
-    settled = tone_responses(_TYPICAL, tones_hz, np.array([MEMORY_S]), 2.0 * MEMORY_S)[0, :, 0]
-    steady = np.abs(settled) ** 2 * power_response(prepared.noise_filter, tones_hz * motion.step_s)
+    steady = settled * power_response(prepared.noise_filter, tones_hz * motion.step_s)
     seen = np.maximum(_moving_sum(weights, cells)[:, :lags], 0.0)
     return Heard(projections, tones_hz, np.concatenate([steady, steady]), seen)
+
+
+@lru_cache(maxsize=160)
+def _kernel(
+    tones_hz: tuple[float, ...], cells: int, step_s: float, length_s: float, size: int
+) -> tuple[Complexes, Floats]:
+    """Transform (K, size) of the typical plant's response to each tone, and its settled power (K,).
+
+    Kept, since all bodies of a recording are searched at the same rates.
+    """
+    tones = np.array(tones_hz)
+    response = tone_responses(_TYPICAL, tones, (np.arange(cells) + 0.5) * step_s, length_s)[0]
+    settled = tone_responses(_TYPICAL, tones, np.array([MEMORY_S]), 2.0 * MEMORY_S)[0, :, 0]
+    return fft.fft(response[:, ::-1], size, axis=-1), np.abs(settled) ** 2
 
 
 def _moving_sum(values: Floats, cells: int) -> Floats:
@@ -97,7 +110,7 @@ def _moving_sum(values: Floats, cells: int) -> Floats:
 
 
 def stacked_tones(codebook: Codebook, channel: Channel, number: int, symbols: Sequence[int] | None = None) -> Tones:
-    """Candidates' tones in the layout of `Heard.projections`, all of them unless `symbols` are named: (M, axes, 2 K)."""
+    """Candidates' tones in the layout of `Heard.projections`, all unless `symbols` are named: (M, axes, 2 K)."""
     tones = codebook.tones(channel, number, symbols)
     return np.concatenate([tones.real, -tones.imag], axis=-1).astype(np.float32)
 

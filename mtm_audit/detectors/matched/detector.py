@@ -6,20 +6,20 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import softmax
 
-from mtm_audit.detectors.base import ChannelReading, Observation, Reading
+from mtm_audit.detectors.base import ChannelReading, Observation, Reading, StrengthLaw
 from mtm_audit.detectors.matched.byclock import Found
 from mtm_audit.detectors.matched.correlate import Prepared, prepare
 from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recording_noise
 from mtm_audit.detectors.matched.fleet import Member, share_timings
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
-from mtm_audit.detectors.matched.noise import NoiseModel, principal_axes
+from mtm_audit.detectors.matched.noise import principal_axes
 from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_audit.detectors.matched.refine import refined_timing
 from mtm_audit.detectors.matched.search import search_timings
 from mtm_audit.detectors.matched.windows import LEAST_PART, Window, make_windows
+from mtm_audit.model.glimpse import Glimpse
 from mtm_audit.model.timing import Onset, Timing
 from mtm_audit.model.track import Floats
-from mtm_audit.significance.decoys import Evidence, weigh_log_evidence
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel
@@ -32,6 +32,7 @@ class MatchedDetector:
     """
 
     name = "matched"
+    strength_law: StrengthLaw = "log evidence"
 
     def __init__(self, profile: PlantProfile | None = None) -> None:
         self._profile = profile
@@ -48,73 +49,110 @@ class MatchedDetector:
 
         The strength is the evidence that the search found, so decoys need no more than the search.
         """
-        motions: dict[int, Motion] = {}
-        refusals: dict[int, MtmError] = {}
-        for number, observation in enumerate(observations):
-            try:
-                motions[number] = uniform_motion(observation.glimpse, codebook.scheme.band_hz[1])
-            except MtmError as refusal:
+        motions, refusals = _motions([observation.glimpse for observation in observations], codebook)
+        prepared = _prepared(motions)
+        channels = {number: observations[number].channel for number in motions}
+        searched = _searched([codebook, *decoys], channels, prepared, onset, progress)
+        for number in list(motions):
+            refusal = _too_short(codebook, channels[number], prepared[number], searched[number][0].timing, onset)
+            if refusal is not None:
                 refusals[number] = refusal
-        readings = self._read_together(codebook, decoys, observations, motions, onset, progress) if motions else {}
+                del motions[number]
+        readings = self._read_together(codebook, channels, prepared, list(motions), searched, onset) if motions else {}
         return [readings[number] if number in readings else refusals[number] for number in range(len(observations))]
 
-    def weigh(self, strength: float, decoy_strengths: Floats, maxima: int) -> Evidence:
-        """Strengths are log evidences."""
-        return weigh_log_evidence(strength, decoy_strengths)
+    def strengths(
+        self, codebooks: Sequence[Codebook], channels: Sequence[Channel], glimpses: Sequence[Glimpse], onset: Onset
+    ) -> Floats:
+        """The log evidence that the search finds for each channel in each glimpse: (codebooks, channels, glimpses)."""
+        result = np.full((len(codebooks), len(channels), len(glimpses)), np.nan)
+        motions, _ = _motions(glimpses, codebooks[0])
+        ticks = np.array([codebooks[0].scheme.window_ticks(channel) for channel in channels])
+        for column, prepared in _prepared(motions).items():
+            for length in np.unique(ticks):
+                rows = np.flatnonzero(ticks == length)
+                played = [(codebook, channels[int(row)]) for row in rows for codebook in codebooks]
+                found = search_timings(played, prepared, onset)
+                for place, item in enumerate(found):
+                    row, number = divmod(place, len(codebooks))
+                    channel = channels[int(rows[row])]
+                    if _too_short(codebooks[0], channel, prepared, item.timing, onset) is None:
+                        result[number, rows[row], column] = item.evidence
+        return result
 
     def _read_together(
         self,
         codebook: Codebook,
-        decoys: Sequence[Codebook],
-        observations: Sequence[Observation],
-        motions: dict[int, Motion],
+        channels: dict[int, Channel],
+        prepared: dict[int, Prepared],
+        numbers: Sequence[int],
+        searched: dict[int, list[Found]],
         onset: Onset,
-        progress: Callable[[float], None] | None,
     ) -> dict[int, ChannelReading]:
-        channels = [observations[number].channel for number in motions]
-        moved = list(motions.values())
-        moved = _along_principal_axes(moved)
+        """Symbols of all observations that hold enough, with a plant that they may share."""
+        moved = [prepared[number].motion for number in numbers]
+        own = [channels[number] for number in numbers]
         noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
-        prepared = [prepare(motion, noise, row) for row, motion in enumerate(moved)]
-        searched = _searched([codebook, *decoys], channels, prepared, onset, progress)
-        timings = [found[0].timing for found in searched]
-        free = onset is None
-        windows = _all_windows(codebook, channels, moved, timings, searched=free)
+        timings = [searched[number][0].timing for number in numbers]
+        windows = _all_windows(codebook, own, moved, timings, onset)
         found = estimate(windows, moved, noise, self._profile)
         better = refined_timing(found, windows, moved, timings)
         if better != timings:
             timings = better
-            windows = _all_windows(codebook, channels, moved, timings, searched=free)
+            windows = _all_windows(codebook, own, moved, timings, onset)
             found = estimate(windows, moved, noise, self._profile)
         readings = {}
-        for row, number in enumerate(motions):
-            strengths = np.array([other.evidence for other in searched[row]])
-            reading = _reading(codebook, channels[row], row, windows, found, timings[row], float(strengths[0]))
+        for row, number in enumerate(numbers):
+            strengths = np.array([other.evidence for other in searched[number]])
+            reading = _reading(codebook, own[row], row, windows, found, timings[row], float(strengths[0]))
             readings[number] = ChannelReading(
-                reading, softmax(reading.scores, axis=1), reading.window_scores, strengths[1:], prepared[row]
+                reading, softmax(reading.scores, axis=1), reading.window_scores, strengths[1:], prepared[number]
             )
         return readings
 
 
+def _motions(glimpses: Sequence[Glimpse], codebook: Codebook) -> tuple[dict[int, Motion], dict[int, MtmError]]:
+    """The motion of each glimpse by its number, and why the others have none."""
+    motions: dict[int, Motion] = {}
+    refusals: dict[int, MtmError] = {}
+    for number, glimpse in enumerate(glimpses):
+        try:
+            motions[number] = uniform_motion(glimpse, codebook.scheme.band_hz[1])
+        except MtmError as refusal:
+            refusals[number] = refusal
+    return motions, refusals
+
+
+def _prepared(motions: dict[int, Motion]) -> dict[int, Prepared]:
+    """Each motion whitened by what all of them show of the interference, along axes that they share."""
+    if not motions:
+        return {}
+    turned = _along_principal_axes(list(motions.values()))
+    noise = fit_recording_noise(turned, [motion.velocities for motion in turned])
+    return {
+        number: prepare(motion, noise, row) for row, (number, motion) in enumerate(zip(motions, turned, strict=True))
+    }
+
+
 def _searched(
     codebooks: Sequence[Codebook],
-    channels: Sequence[Channel],
-    prepared: Sequence[Prepared],
+    channels: dict[int, Channel],
+    prepared: dict[int, Prepared],
     onset: Onset,
     progress: Callable[[float], None] | None,
-) -> list[list[Found]]:
+) -> dict[int, list[Found]]:
     """For each robot, for each codebook the timing; robots whose windows are of one length share what they found."""
-    searched = []
-    for row, (channel, robot) in enumerate(zip(channels, prepared, strict=True)):
-        part = None if progress is None else _part_of(progress, row, len(channels))
-        searched.append(search_timings(codebooks, channel, robot, onset, part))
-    lengths = [codebooks[0].scheme.window_ticks(channel) for channel in channels]
-    for length in dict.fromkeys(lengths):
-        fleet = [row for row, other in enumerate(lengths) if other == length]
+    searched: dict[int, list[Found]] = {}
+    for row, (number, robot) in enumerate(prepared.items()):
+        part = None if progress is None else _part_of(progress, row, len(prepared))
+        played = [(codebook, channels[number]) for codebook in codebooks]
+        searched[number] = search_timings(played, robot, onset, part)
+    lengths = {number: codebooks[0].scheme.window_ticks(channels[number]) for number in prepared}
+    for length in dict.fromkeys(lengths.values()):
+        fleet = [number for number, other in lengths.items() if other == length]
         if len(fleet) > 1:
-            members = [Member(channels[row], prepared[row], searched[row]) for row in fleet]
-            for row, found in zip(fleet, share_timings(codebooks, members, onset), strict=True):
-                searched[row] = found
+            members = [Member(channels[number], prepared[number], searched[number]) for number in fleet]
+            searched.update(zip(fleet, share_timings(codebooks, members, onset), strict=True))
     return searched
 
 
@@ -136,24 +174,37 @@ def _all_windows(
     channels: Sequence[Channel],
     motions: Sequence[Motion],
     timings: Sequence[Timing],
-    *,
-    searched: bool,
+    onset: Onset,
 ) -> list[Window]:
     windows = []
     for number, (channel, motion, timing) in enumerate(zip(channels, motions, timings, strict=True)):
-        length_s = codebook.scheme.window_ticks(channel) / timing.rate_hz
-        end_s = motion.start_s + len(motion.seen) * motion.step_s
-        first = int(np.ceil((motion.start_s - timing.onset_s) / length_s - (1.0 - LEAST_PART)))
-        last = int(np.floor((end_s - timing.onset_s) / length_s - LEAST_PART))
-        if not searched or codebook.scheme.schedule == "rolling":
-            first = max(0, first)
-        if last < first:
-            raise MtmError(
-                f"the recording holds less than a third of a window of {length_s:g} s of channel {channel.name!r} "
-                "after the onset; record longer"
-            )
-        windows += make_windows(codebook, channel, motion, timing, number, range(first, last + 1))
+        numbers = _numbers(codebook, channel, motion, timing, onset)
+        windows += make_windows(codebook, channel, motion, timing, number, numbers)
     return windows
+
+
+def _numbers(codebook: Codebook, channel: Channel, motion: Motion, timing: Timing, onset: Onset) -> range:
+    """Which windows from the onset on the motion shows enough of; under a fixed schedule earlier ones repeat it."""
+    length_s = codebook.scheme.window_ticks(channel) / timing.rate_hz
+    end_s = motion.start_s + len(motion.seen) * motion.step_s
+    first = int(np.ceil((motion.start_s - timing.onset_s) / length_s - (1.0 - LEAST_PART)))
+    last = int(np.floor((end_s - timing.onset_s) / length_s - LEAST_PART))
+    if onset is not None or codebook.scheme.schedule == "rolling":
+        first = max(0, first)
+    return range(first, last + 1)
+
+
+def _too_short(
+    codebook: Codebook, channel: Channel, prepared: Prepared, timing: Timing, onset: Onset
+) -> MtmError | None:
+    """Why no window of the channel can be read from the motion; None when one can."""
+    if len(_numbers(codebook, channel, prepared.motion, timing, onset)):
+        return None
+    length_s = codebook.scheme.window_ticks(channel) / timing.rate_hz
+    return MtmError(
+        f"the recording holds less than a third of a window of {length_s:g} s of channel {channel.name!r} after the "
+        "onset; record longer"
+    )
 
 
 def _reading(
@@ -172,4 +223,4 @@ def _reading(
     scores = np.zeros((channel.symbols, codebook.scheme.alphabet_size))
     np.add.at(scores, positions, ratios)
     starts_s = timing.onset_s + numbers * (codebook.scheme.window_ticks(channel) / timing.rate_hz)
-    return Reading(timing, scores, ratios, numbers, positions, starts_s, strength, 1)
+    return Reading(timing, scores, ratios, numbers, positions, starts_s, strength)

@@ -71,32 +71,33 @@ def waveform_sets(scheme: Scheme, channel: Channel, motion: Motion, onset: Onset
 
 
 def search_timings(
-    codebooks: Sequence[Codebook],
-    channel: Channel,
+    played: Sequence[tuple[Codebook, Channel]],
     prepared: Prepared,
     onset: Onset,
     progress: Callable[[float], None] | None = None,
 ) -> list[Found]:
-    """For each codebook the best timing: rates, and onsets as far as they are not known.
+    """The best timing of each channel that may be `played`: rates, and onsets as far as they are not known.
 
-    Rates lie within +-20 %, and where clocks bound the onset near the nominal one. Under the fixed schedule the onset
-    found is that of the first window in step with the message.
+    The channels' codebooks share one scheme and their windows one length. Rates lie within +-20 %, and where clocks
+    bound the onset near the nominal one. Under the fixed schedule the onset found is that of the first window in step
+    with the message.
     """
-    scheme, motion = codebooks[0].scheme, prepared.motion
+    (codebook, channel), motion = played[0], prepared.motion
+    scheme = codebook.scheme
     ticks = scheme.window_ticks(channel)
     rates_hz = candidate_rates(scheme, channel, onset)
     lead = lead_cells(scheme, channel, motion, onset)
     windows = waveform_sets(scheme, channel, motion, onset)
-    tones = [[stacked_tones(codebook, channel, number) for number in range(windows)] for codebook in codebooks]
+    tones = [[stacked_tones(book, one, number) for number in range(windows)] for book, one in played]
     if isinstance(onset, OnsetRange):
-        heard = hear(prepared, codebooks[0], channel, scheme.rate_hz, lead)
+        heard = hear(prepared, codebook, channel, scheme.rate_hz, lead)
         return starts_by_clock(heard, Place(motion, lead, ticks, scheme.rate_hz), tones, onset, progress)
     spacing = float(rates_hz[1] - rates_hz[0]) / scheme.rate_hz
 
     def place(coarse: int) -> tuple[Heard, Grid]:
         rate_hz = float(rates_hz[coarse])
         grid = make_grid(motion, scheme.rate_hz, rate_hz, spacing, ticks, lead, windows, onset)
-        return hear(prepared, codebooks[0], channel, rate_hz, lead), grid
+        return hear(prepared, codebook, channel, rate_hz, lead), grid
 
     def report(fraction: float) -> None:
         if progress is not None:

@@ -116,23 +116,31 @@ def statistics(window: Window, tones: Floats, rows: Floats, noise: NoiseModel, r
     """
     order = noise.order
     before = max(0, window.first - order)
-    silent = np.zeros((*rows.shape[:2], window.first - before))
-    heard = whitened(np.concatenate([silent, rows], axis=2), noise.filter)
     observed = whitened(residual[:, before : window.last], noise.filter)
     scales = noise.scales[window.observation]
     weights = noise.weights[window.observation][:, before + order : window.last]
     count, axes, width = tones.shape
     flat = tones.reshape(count * axes, width)
-    # Few candidates are cheapest as waveforms, many as quadratic forms of their tones.
-    summarise = _from_waveforms if len(flat) <= width else _from_tones
-    return summarise(flat, axes, heard, weights / scales[:, None] * observed, weights)
+    pulled = weights / scales[:, None] * observed
+    # Few candidates are cheapest as waveforms, many as quadratic forms of their tones; either way what is fewer is
+    # whitened.
+    if len(flat) <= width:
+        waveforms = _whitened_from_start(flat @ rows, window.first - before, noise.filter)
+        return _from_waveforms(waveforms.reshape(len(rows), count, axes, -1), pulled, weights)
+    return _from_tones(flat, axes, _whitened_from_start(rows, window.first - before, noise.filter), pulled, weights)
 
 
-def _from_waveforms(flat: Floats, axes: int, heard: Floats, pulled: Floats, weights: Floats) -> Statistics:
-    """`flat` (L A, 2 K), `heard` (plants, 2 K, n) whitened, `pulled` and `weights` (observed axes, n)."""
-    waveforms = (flat @ heard).reshape(len(heard), -1, axes, heard.shape[-1])
+def _whitened_from_start(signals: Floats, history: int, whitening_filter: Floats) -> Floats:
+    """Whiten signals (plants, rows, n) that were silent in the `history` cells before their first."""
+    silent = np.zeros((*signals.shape[:2], history))
+    return whitened(np.concatenate([silent, signals], axis=2), whitening_filter)
+
+
+def _from_waveforms(waveforms: Floats, pulled: Floats, weights: Floats) -> Statistics:
+    """`waveforms` (plants, L, A, n) whitened, `pulled` and `weights` (observed axes, n)."""
+    plants, candidates, axes, _ = waveforms.shape
     information = np.einsum("plan,dn->dlpa", waveforms, pulled, optimize=True)
-    precision = np.empty((len(pulled), waveforms.shape[1], len(heard), axes, axes))
+    precision = np.empty((len(pulled), candidates, plants, axes, axes))
     for one in range(axes):
         for other in range(one, axes):
             product = (waveforms[:, :, one] * waveforms[:, :, other]) @ weights.T
