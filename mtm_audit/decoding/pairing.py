@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.scheme import Channel
@@ -42,6 +41,8 @@ def choose_pairs(strengths: Floats, owners: NDArray[np.int64]) -> tuple[NDArray[
     of each channel. Returns the track of each body, (codebooks, bodies), -1 for none, and the sums (codebooks,). As
     many bodies as possible get a track that can be read.
     """
+    from scipy.optimize import linear_sum_assignment
+
     bodies = int(owners.max()) + 1
     readable = np.isfinite(strengths)
     worth = np.zeros((len(strengths), bodies, strengths.shape[2]))

@@ -31,7 +31,7 @@ Integers = NDArray[np.int64]
 # Of a symbol's weights so much come from the others, the rest from the prior.
 _OTHERS = 0.9
 _PAIRS = 6
-_HYPOTHESES = 64
+_HYPOTHESES = 32
 # How many candidates of a position are weighed exactly.
 _TRIED = 2
 

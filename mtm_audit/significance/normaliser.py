@@ -17,8 +17,8 @@ _CONVERGED = 1e-12
 # Heights y of the contour s(y) = s0 + w (i y - b y^2), where w is the saddle's width and b bends it along the steepest
 # descent, so that the integrand falls like a Gaussian even where d is small.
 # Below the axis the integrand is the complex conjugate.
-_STEP = 0.4
-_HEIGHTS = np.arange(0.0, 10.0, _STEP)
+_STEP = 0.5
+_HEIGHTS = np.arange(0.0, 8.5, _STEP)
 
 
 def log_mean_normal(linear: Floats, quadratic: Floats) -> Floats:

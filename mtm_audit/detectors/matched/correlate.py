@@ -11,7 +11,7 @@ from scipy import fft
 from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, log_sum_exp
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import NoiseModel, power_response, whitened
-from mtm_audit.detectors.matched.plants import MEMORY_S, TAIL_S, Complexes, plant_family, tone_responses
+from mtm_audit.detectors.matched.plants import MEMORY_S, TAIL_S, plant_family, tone_responses
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel
@@ -73,12 +73,12 @@ def hear(prepared: Prepared, codebook: Codebook, channel: Channel, rate_hz: floa
     lags = count + lead
     size = fft.next_fast_len(count + lead + cells)
     kernel, settled = _kernel(tuple(tones_hz.tolist()), cells, motion.step_s, length_s, size)
-    shifted = np.zeros((len(prepared.filtered), size))
+    shifted = np.zeros((len(prepared.filtered), size), dtype=np.float32)
     shifted[:, lead : lead + count] = prepared.filtered
     # Correlation: the sum over cells of shifted[lag + cell] times response[cell].
     crossed = fft.fft(shifted, axis=-1)[:, None] * kernel[None]
-    heard = fft.ifft(crossed, axis=-1)[..., cells - 1 : cells - 1 + lags]
-    projections = np.concatenate([heard.real, heard.imag], axis=1).astype(np.float32)
+    heard = fft.ifft(crossed, axis=-1, overwrite_x=True)[..., cells - 1 : cells - 1 + lags]
+    projections = np.concatenate([heard.real, heard.imag], axis=1)
     weights = np.zeros((len(prepared.weights), size))
     weights[:, lead : lead + count] = prepared.weights
     steady = settled * power_response(prepared.noise_filter, tones_hz * motion.step_s)
@@ -89,7 +89,7 @@ def hear(prepared: Prepared, codebook: Codebook, channel: Channel, rate_hz: floa
 @lru_cache(maxsize=160)
 def _kernel(
     tones_hz: tuple[float, ...], cells: int, step_s: float, length_s: float, size: int
-) -> tuple[Complexes, Floats]:
+) -> tuple[NDArray[np.complex64], Floats]:
     """Transform (K, size) of the typical plant's response to each tone, and its settled power (K,).
 
     Kept, since all bodies of a recording are searched at the same rates.
@@ -97,7 +97,7 @@ def _kernel(
     tones = np.array(tones_hz)
     response = tone_responses(_TYPICAL, tones, (np.arange(cells) + 0.5) * step_s, length_s)[0]
     settled = tone_responses(_TYPICAL, tones, np.array([MEMORY_S]), 2.0 * MEMORY_S)[0, :, 0]
-    return fft.fft(response[:, ::-1], size, axis=-1), np.abs(settled) ** 2
+    return fft.fft(response[:, ::-1].astype(np.complex64), size, axis=-1), np.abs(settled) ** 2
 
 
 def _moving_sum(values: Floats, cells: int) -> Floats:

@@ -76,7 +76,11 @@ def tone_responses(plants: Plants, tones_hz: Floats, since_start_s: Floats, leng
     instants_s = (np.arange(plants.taps.shape[1]) + 0.5) * TAP_S
     turned = plants.taps[:, None, :] * np.exp(-2j * np.pi * tones_hz[:, None] * instants_s)
     summed = np.concatenate([np.zeros((*turned.shape[:2], 1)), np.cumsum(turned, axis=2)], axis=2)
-    heard = _at(summed, since_start_s) - _at(summed, since_start_s - length_s)
+    # Between the transients at its begin and end a response is settled.
+    moving = (since_start_s < MEMORY_S) | (since_start_s > length_s)
+    heard = np.repeat(summed[:, :, -1:], len(since_start_s), axis=2)
+    moving_s = since_start_s[moving]
+    heard[:, :, moving] = _at(summed, moving_s) - _at(summed, moving_s - length_s)
     responses: Complexes = heard * np.exp(2j * np.pi * tones_hz[:, None] * since_start_s)
     return responses
 

@@ -25,6 +25,8 @@ SEARCHED_RATES = 0.2
 _PHASE_ERROR_RAD = 0.6
 _PEAKS_PER_RATE = 8
 _WEIGHED = 64
+_USUAL_RATES = 0.03
+_PLAIN_NATS = 20.0
 _HALF_CELLS = np.arange(-3, 4) / 2.0
 
 
@@ -105,7 +107,7 @@ def search_timings(
 
     if isinstance(onset, int | float):
         return _rates_at_known_onset(place, len(rates_hz), tones, motion, lead, report)
-    return _onsets_and_rates(place, len(rates_hz), tones, motion, lead, report)
+    return _onsets_and_rates(place, len(rates_hz), spacing, tones, motion, lead, report)
 
 
 def _rates_at_known_onset(
@@ -126,11 +128,45 @@ def _found_evidence(found: Found) -> float:
 
 
 def _onsets_and_rates(
-    place: _Place, rates: int, tones: Sequence[Sequence[Tones]], motion: Motion, lead: int, report: _Report
+    place: _Place,
+    rates: int,
+    spacing: float,
+    tones: Sequence[Sequence[Tones]],
+    motion: Motion,
+    lead: int,
+    report: _Report,
 ) -> list[Found]:
+    middle = rates // 2
+    usual = [coarse for coarse in range(rates) if abs(coarse - middle) * spacing <= _USUAL_RATES]
+    best = _best_of_rates(place, usual, tones, motion, report)
+    # Clocks are seldom far off: where every message stands out well inside the usual rates, others cannot do better.
+    plain = all(
+        evidence > _PLAIN_NATS and abs(winner.coarse - middle) * spacing <= 0.5 * _USUAL_RATES
+        for evidence, winner in best
+    )
+    if not plain:
+        others = [coarse for coarse in range(rates) if coarse not in usual]
+        pairs = zip(best, _best_of_rates(place, others, tones, motion, report), strict=True)
+        best = [max(pair, key=_evidence) for pair in pairs]
+    found_at: dict[int, Found] = {}
+    winning = sorted({winner.coarse for _, winner in best})
+    for done, coarse in enumerate(winning):
+        report(0.5 + 0.5 * done / len(winning))
+        heard, grid = place(coarse)
+        numbers = [number for number, (_, winner) in enumerate(best) if winner.coarse == coarse]
+        starts = [best[number][1].hypothesis.start for number in numbers]
+        near = _surroundings(heard, grid, [tones[n] for n in numbers], starts, motion, lead, onset_known=False)
+        found_at.update(zip(numbers, near, strict=True))
+    return [found_at[number] for number in range(len(best))]
+
+
+def _best_of_rates(
+    place: _Place, rates: Sequence[int], tones: Sequence[Sequence[Tones]], motion: Motion, report: _Report
+) -> list[tuple[float, _Candidate]]:
+    """The best hypothesis of each channel at some coarse rates, with its coherent evidence."""
     candidates: list[list[_Candidate]] = [[] for _ in tones]
-    for coarse in range(rates):
-        report(0.5 * coarse / rates)
+    for done, coarse in enumerate(rates):
+        report(0.5 * done / len(rates))
         heard, grid = place(coarse)
         for number, peaks in enumerate(fold(evidence_by_lag(tones, heard), grid, _PEAKS_PER_RATE)):
             candidates[number] += [_Candidate(coarse, peak) for peak in peaks]
@@ -143,16 +179,7 @@ def _onsets_and_rates(
         weighed = _weigh(heard, grid, [tones[number] for number in numbers], [here[n] for n in numbers], motion.step_s)
         for number, winner in zip(numbers, weighed, strict=True):
             best[number] = max(best[number], winner, key=_evidence)
-    found_at: dict[int, Found] = {}
-    winning = sorted({winner.coarse for _, winner in best})
-    for done, coarse in enumerate(winning):
-        report(0.5 + 0.5 * done / len(winning))
-        heard, grid = place(coarse)
-        numbers = [number for number, (_, winner) in enumerate(best) if winner.coarse == coarse]
-        starts = [best[number][1].hypothesis.start for number in numbers]
-        near = _surroundings(heard, grid, [tones[n] for n in numbers], starts, motion, lead, onset_known=False)
-        found_at.update(zip(numbers, near, strict=True))
-    return [found_at[number] for number in range(len(best))]
+    return best
 
 
 def _evidence(weighed: tuple[float, _Candidate]) -> float:
