@@ -29,6 +29,8 @@ SHAPES: Plants = joined(
 _COARSE = slice(1, None, 4)
 _COARSE_LEVELS = 3
 _CANDIDATES = 8
+# Prior probability that a position carries nothing: hidden, beyond the message's end, or not played.
+_SILENT = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,13 +80,19 @@ class ChannelTerms:
         return np.stack([table[..., self.positions == place, :].sum(axis=-2) for place in self.shown], axis=-2)
 
     def mixed(self, table: Floats, without: int | None = None) -> Floats:
-        """Log mean over all symbols of e-values (..., groups, k): (..., shown positions). Those not looked at, and the
-        symbol `without`, count nothing.
+        """Log mean over all symbols of e-values (..., groups, k), or nothing sent: (..., shown positions).
+
+        Symbols not looked at, and the symbol `without`, count nothing.
         """
         summed = self.by_position(table)
         if without is not None:
             summed = np.where(self.candidates == without, -np.inf, summed)
-        return np.asarray(logsumexp(summed, axis=-1) - np.log(self.alphabet_size))
+        return or_silent(np.asarray(logsumexp(summed, axis=-1) - np.log(self.alphabet_size)))
+
+
+def or_silent(log_values: Floats, count: int = 1) -> Floats:
+    """Log mean of e-values of `count` positions and of 1, which is what positions without a waveform would give."""
+    return np.logaddexp(log_values + count * np.log(1.0 - _SILENT), count * np.log(_SILENT))
 
 
 @dataclass(frozen=True)
@@ -152,10 +160,11 @@ class Terms:
                 tones = channel.tones[places[:1], column : column + 1]
                 joint = log_e_of(linear[:, places].sum(1, keepdims=True), quadratic[:, places].sum(1, keepdims=True),
                                  tones, channel.law)  # fmt: skip
-                total += joint[:, 0, 0] - len(places) * np.log(channel.alphabet_size)
+                total += or_silent(joint[:, 0, 0] - len(places) * np.log(channel.alphabet_size), len(places))
                 continue
             mine = self._claimed(best, int(places[0]), symbols)
-            total += logsumexp(np.where(mine, table[:, places[0]], -np.inf), axis=-1) - np.log(channel.alphabet_size)
+            own = logsumexp(np.where(mine, table[:, places[0]], -np.inf), axis=-1)
+            total += or_silent(own - np.log(channel.alphabet_size))
         return total
 
     def _claimed(self, best: Floats, place: int, symbols: Integers) -> NDArray[np.bool_]:

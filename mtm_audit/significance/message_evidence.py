@@ -220,10 +220,10 @@ def _by_others(own: Sequence[_Own], row: int, showing: Sequence[int], position: 
         for other in elsewhere:
             theirs = other.channel
             value = theirs.mixed(table_of(theirs.at(at_phase_of(theirs.timing, timing, theirs.span.window_ticks))))
-            total = total + np.logaddexp(value.sum(axis=-1), np.log(0.5))
+            total = total + np.logaddexp(value.sum(axis=-1), 0.0)
         if mine:
             values = channel.mixed(table_of(terms), symbol if channel.shared else None)
-            total = total + np.delete(np.logaddexp(values, np.log(0.1)), place[0], axis=-1).sum(axis=-1)
+            total = total + np.delete(values, place[0], axis=-1).sum(axis=-1)
         return total
 
     coarse = logsumexp(said(lambda table: table.coarse), axis=(1, 2)) + terms.log_priors
