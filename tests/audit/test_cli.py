@@ -261,8 +261,8 @@ def run_program(*arguments, **options):
 
 def test_control_c_during_the_work_leaves_nothing_half_done(folder, tmp_path):
     busy = run_program(
-        "decode", folder / "sent", "--key", folder / "robot.key", "--json", "--decoys", "100000",
-        "--plot", tmp_path / "decode.png",
+        "decode", folder / "sent", "--key", folder / "robot.key", "--json", "--detector",
+        "coherency", "--decoys", "10000", "--plot", tmp_path / "decode.png",
     )  # fmt: skip
     # Loading takes a moment; what comes before it must end well, too, so the exact instant does not matter.
     time.sleep(1.5)
@@ -366,6 +366,7 @@ def test_a_key_that_others_can_read_is_refused(audit, folder, tmp_path):
     [
         ("--onset", "soon"), ("--onset", "nan"), ("--onset", "inf"), ("--assign", "robot0"), ("--assign", "=red"),
         ("--assign", "robot0="), ("--assign", "robot0=a", "--assign", "robot0=b"), ("--decoys", "3"),
+        ("--decoys", "10001"),
         ("--threshold", "2"), ("--nothing",),
     ],
 )  # fmt: skip
