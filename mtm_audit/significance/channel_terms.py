@@ -92,7 +92,7 @@ class ChannelTerms:
 
 def or_silent(log_values: Floats, count: int = 1) -> Floats:
     """Log mean of e-values of `count` positions and of 1, which is what positions without a waveform would give."""
-    return np.logaddexp(log_values + count * np.log(1.0 - _SILENT), count * np.log(_SILENT))
+    return np.asarray(np.logaddexp(log_values + count * np.log(1.0 - _SILENT), count * np.log(_SILENT)))
 
 
 @dataclass(frozen=True)
