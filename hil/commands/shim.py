@@ -4,9 +4,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.detectors.paper_robomaster import Proportion
 from hil.experiments.hardening.shim import JOB, compare, write_csv
 from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.proportion import Proportion
 from hil.plants.mecanum import calibrated_parameters
 from hil.vehicles.shim_library import load_shim
 

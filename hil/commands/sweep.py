@@ -5,8 +5,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.detectors.accuracy_table import Sweep, grid, measure, world_of
 from hil.experiments.runs.cells import CellStore
+from hil.experiments.worlds.accuracy_table import Sweep, grid, measure, world_of
 from mtm_audit.planning.table import write_table
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.schemefile import load_scheme

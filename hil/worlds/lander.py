@@ -5,13 +5,14 @@ default. Lengths are the simulator's metres, of which the picture shows 20 x 13.
 counter-clockwise.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from Box2D import b2Body as Body
 from gymnasium.envs.box2d import lunar_lander
 
+from hil.worlds.lander_pictures import drawn, rendered
+from hil.worlds.lander_states import state_of
 from hil.worlds.world import Conduct, Integers, Rollout, Shot
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.track import Floats
@@ -23,13 +24,6 @@ HOVER_Y_M = 10.0
 # The part of the picture into which neither terrain nor flags reach, as left, upper, right and lower edge.
 SKY_PX = (0, 0, 600, 200)
 WARM_UP_TICKS = 150
-
-# Columns of a shot's states: the terrain's heights, then x, y and angle of the lander and of its two legs, then x, y
-# and remaining life of each particle of the flames, oldest first, NaN where there are fewer.
-TERRAIN_POINTS = 11
-BODIES = 3
-# A particle lives for at most seven pictures, and two are born in a tick.
-MOST_PARTICLES = 16
 
 # The paper does not give its controller's gains, and accuracy hangs on them. These were chosen, on seeds below 10,000,
 # so that accuracies come near the paper's at M = 8 with T = 192 and 288; at T = 96 they lie well above the paper's. A
@@ -46,7 +40,6 @@ LANDING_LEAN_PER_M, LANDING_LEAN_PER_MPS = 0.05, 0.15
 SINK_PER_S, SINK_MPS = 0.6, (0.5, 4.0)
 
 _STREAM = 23
-FADING_PER_PICTURE = 0.15
 
 
 class LunarLander:
@@ -84,14 +77,10 @@ class LunarLander:
 
     def pictures(self, shot: Shot) -> Iterator[Frame]:
         """The shot drawn like Gymnasium's `rgb_array`, flames included."""
-        from hil.worlds.lander_pictures import drawn
-
         return drawn(shot)
 
     def native_pictures(self, shot: Shot) -> Iterator[Frame]:
         """The shot drawn by Gymnasium itself; raises MtmError when pygame is missing."""
-        from hil.worlds.lander_pictures import rendered
-
         return rendered(shot)
 
     def tracker(self) -> Tracker:
@@ -152,11 +141,11 @@ def _descent(
         side, main = hover_action(environment.lander, pad_x_m)
         lost |= environment.step(np.array((main, side)))[2]  # type: ignore[no-untyped-call]
     environment.render_mode = "rgb_array"
-    states, base = [_state(environment)], np.empty_like(noise)
+    states, base = [state_of(environment)], np.empty_like(noise)
     for tick, added in enumerate(noise):
         base[tick] = hover_action(environment.lander, pad_x_m)
         lost |= environment.step((base[tick] + added)[::-1])[2]  # type: ignore[no-untyped-call]
-        states.append(_state(environment))
+        states.append(state_of(environment))
     return np.stack(states), base, lost
 
 
@@ -183,15 +172,3 @@ def _conduct(base: Floats, noise: Floats, scores: dict[str, float]) -> Conduct:
 
 def _environment_seed(parts: Sequence[int]) -> int:
     return int(np.random.SeedSequence([_STREAM, *parts]).generate_state(1)[0])
-
-
-def _state(environment: lunar_lander.LunarLander) -> Floats:
-    """One row of states; the flames fade by a picture, which Gymnasium does as it draws them."""
-    for particle in environment.particles:
-        particle.ttl -= FADING_PER_PICTURE
-    environment._clean_particles(False)  # type: ignore[no-untyped-call]
-    terrain = [polygon[0][1] for polygon in environment.sky_polys] + [environment.sky_polys[-1][1][1]]
-    bodies = [(*body.position, body.angle) for body in environment.drawlist]
-    flames = [(*particle.position, particle.ttl) for particle in environment.particles]
-    flames += [(math.nan,) * 3] * (MOST_PARTICLES - len(flames))
-    return np.concatenate([terrain, np.ravel(bodies), np.ravel(flames)])

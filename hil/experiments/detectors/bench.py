@@ -11,8 +11,8 @@ from rich.console import Console
 
 from hil.experiments.detectors.bench_recording import Job
 from hil.experiments.detectors.bench_rollout import COHERENCY, GENIE, MATCHED, read_rollout, rollout_parameters
-from hil.experiments.detectors.paper_robomaster import Proportion
 from hil.experiments.runs.cells import Cell, CellStore, Values
+from hil.experiments.runs.proportion import Proportion
 from hil.experiments.runs.sweep import run_sweep
 from hil.plants.mecanum import MecanumParameters
 from hil.worlds.robomaster import ROBOTS

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from hil.experiments.detectors.bench import DETECTORS, PAPER_SIGMA, Row
 from hil.experiments.detectors.bench_rollout import COHERENCY, GENIE, MATCHED
-from hil.experiments.detectors.paper_robomaster import Proportion
+from hil.experiments.runs.proportion import Proportion
 from mtm_onboard.protocol.atomicfile import replacing
 
 _COLUMNS = ("alphabet_size", "window_ticks", "windows", "sigma", "detector", "rollouts")

@@ -13,35 +13,12 @@ from hil.experiments.detectors.paper_figures import PaperFigure
 from hil.experiments.detectors.robomaster_rollout import NO_MESSAGE, SENT, WRONG_KEY, decode_rollout, rollout_parameters
 from hil.experiments.runs.cells import Cell, CellStore, Values
 from hil.experiments.runs.commented_csv import write_commented_csv
-from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.proportion import Proportion
 from hil.experiments.runs.sweep import run_sweep
 from hil.plants.mecanum import MecanumParameters
 
 # Wrong keys that try each rollout: with 40 rollouts of four robots as many decodes as in the paper.
 DECOYS = 10
-
-
-@dataclass(frozen=True)
-class Proportion:
-    """Successes out of trials."""
-
-    successes: int
-    trials: int
-
-    @property
-    def percent(self) -> float:
-        """100 times the share of successes."""
-        return 100.0 * self.successes / self.trials
-
-    @property
-    def interval_percent(self) -> tuple[float, float]:
-        """Exact 95 % interval, which takes the trials for independent."""
-        low, high = clopper_pearson(self.successes, self.trials)
-        return 100.0 * low, 100.0 * high
-
-    def __str__(self) -> str:
-        low, high = self.interval_percent
-        return f"{self.percent:.1f} [{low:.0f}-{high:.0f}]"
 
 
 @dataclass(frozen=True)

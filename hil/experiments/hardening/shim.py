@@ -11,8 +11,8 @@ from rich.console import Console
 from hil.experiments.detectors.bench import FIRST_SEED, PAPER_SIGMA
 from hil.experiments.detectors.bench_recording import Job, record
 from hil.experiments.detectors.bench_rollout import job_of, plant_of, read_matched
-from hil.experiments.detectors.paper_robomaster import Proportion
 from hil.experiments.runs.cells import Cell, CellStore, Scalar, Values
+from hil.experiments.runs.proportion import Proportion
 from hil.experiments.runs.sweep import run_sweep
 from hil.plants.mecanum import MecanumParameters
 from hil.vehicles.shim_modulator import ShimModulator

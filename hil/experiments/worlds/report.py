@@ -7,9 +7,9 @@ from pathlib import Path
 
 from rich.table import Table
 
-from hil.experiments.detectors.paper_robomaster import Proportion
 from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.proportion import Proportion
 from hil.experiments.worlds.points import PaperCell, headline_point
 from hil.experiments.worlds.reading import COHERENCY
 from hil.experiments.worlds.rollout import NO_MESSAGE, SENT

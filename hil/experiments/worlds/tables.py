@@ -8,8 +8,8 @@ import numpy as np
 from rich.console import Console
 from scipy.stats import fisher_exact
 
-from hil.experiments.detectors.paper_robomaster import Proportion
 from hil.experiments.runs.cells import Cell, CellStore, Values
+from hil.experiments.runs.proportion import Proportion
 from hil.experiments.runs.sweep import run_sweep
 from hil.experiments.worlds.genie import GENIE
 from hil.experiments.worlds.points import HEADLINES, PaperCell, Point, headline_point, paper_cells

@@ -16,6 +16,7 @@ from mtm_onboard.protocol import Codebook, MtmError
 lunar_lander = pytest.importorskip("gymnasium.envs.box2d.lunar_lander")
 lander = pytest.importorskip("hil.worlds.lander")
 pictures = pytest.importorskip("hil.worlds.lander_pictures")
+states = pytest.importorskip("hil.worlds.lander_states")
 
 SECRET = b"not a real secret, only for test"
 SCHEME = same_scheme("lunar-lander", 8, 192, 1)
@@ -30,7 +31,7 @@ def rollout(*pads, seed=3):
 
 
 def bodies(shot):
-    return shot.states[:, lander.TERRAIN_POINTS :].reshape(len(shot.states), -1, 3)[:, : lander.BODIES]
+    return shot.states[:, states.TERRAIN_POINTS :].reshape(len(shot.states), -1, 3)[:, : states.BODIES]
 
 
 def tracked(frames):
@@ -61,7 +62,7 @@ def test_the_lander_hovers_over_its_pad_in_view_and_above_all_terrain():
         hull = bodies(shot)[:, 0]
         assert hull[-1, 0] == pytest.approx(lander.PADS_X_M[pad], abs=1.5)
         assert np.all(np.abs(hull[:, 1] - lander.HOVER_Y_M) < 1.5)
-        assert shot.states[0, : lander.TERRAIN_POINTS].max() < hull[:, 1].min() - 1.0
+        assert shot.states[0, : states.TERRAIN_POINTS].max() < hull[:, 1].min() - 1.0
 
 
 def test_a_rollout_comes_again_from_its_seed_and_another_descends_over_other_terrain():
@@ -135,7 +136,7 @@ def test_a_video_file_decodes_as_the_pictures_in_memory_do(tmp_path):
 
 def test_flames_are_drawn_where_the_main_engine_blew_them():
     shot = rollout(6, 1).shots[0]
-    flames = shot.states[100, lander.TERRAIN_POINTS :].reshape(-1, 3)[lander.BODIES :]
+    flames = shot.states[100, states.TERRAIN_POINTS :].reshape(-1, 3)[states.BODIES :]
     youngest = flames[~np.isnan(flames[:, 0])][np.argmax(flames[~np.isnan(flames[:, 0])][:, 2])]
     column, row = int(youngest[0] * 30.0), 399 - int(youngest[1] * 30.0)
     blue, green, red = drawn(0)[100].image[row, column].astype(int)

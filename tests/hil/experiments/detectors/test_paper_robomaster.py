@@ -4,9 +4,10 @@ import io
 import pytest
 from rich.console import Console
 
-from hil.experiments.detectors.paper_robomaster import Proportion, measure, rich_table, write_csv
+from hil.experiments.detectors.paper_robomaster import measure, rich_table, write_csv
 from hil.experiments.detectors.robomaster_rollout import NO_MESSAGE, SENT, WRONG_KEY, decode_rollout, rollout_parameters
 from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.proportion import Proportion
 from hil.plants.mecanum import calibrated_parameters
 
 QUIET = Console(file=io.StringIO(), width=100)

@@ -3,7 +3,7 @@ import csv
 import pytest
 
 from hil.cli import main
-from hil.experiments.detectors.paper_robomaster import Proportion
+from hil.experiments.runs.proportion import Proportion
 from hil.experiments.worlds.points import headline_point, paper_cells
 from hil.experiments.worlds.report import against_the_paper
 from hil.experiments.worlds.rollout import NO_MESSAGE

@@ -7,8 +7,8 @@ from functools import partial
 from rich.console import Console
 
 from hil.experiments.detectors.accuracy_rollout import WHOLE, read_rollout, rollout_parameters
-from hil.experiments.detectors.paper_robomaster import Proportion
 from hil.experiments.runs.cells import Cell, CellStore, Scalar, Values
+from hil.experiments.runs.proportion import Proportion
 from hil.experiments.runs.sweep import Compute, run_sweep
 from hil.experiments.worlds.accuracy import read_world, world_parameters, world_scheme
 from hil.plants.mecanum import calibrated_parameters
