@@ -1,6 +1,5 @@
 """`mtm-hil faults`: what a robot does when its wire goes wrong."""
 
-import csv
 from dataclasses import astuple, fields
 from pathlib import Path
 
@@ -8,10 +7,14 @@ from rich.console import Console
 
 from hil.experiments.hardening.faults import Line, Outcome, fault_cell, fault_cells, line_of
 from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.sweep import run_sweep
-from mtm_onboard.protocol.atomicfile import replacing
 
 _NO_LOSS = "no"
+_COLUMNS = (
+    "wire", "fault", "loss", "seed", "stops", "is_fresh", "is_read", "silent_deadline_s", "lost_deadline_s",
+    *(field.name for field in fields(Outcome)),
+)  # fmt: skip
 
 
 def faults(seeds: int, seed: int, workers: int | None, out: Path | None, cells: Path, console: Console) -> bool:
@@ -25,14 +28,8 @@ def faults(seeds: int, seed: int, workers: int | None, out: Path | None, cells: 
     wrong = sum(not (line.stops and line.is_fresh and line.is_read) for line in lines)
     print(f"{len(lines)} runs, {wrong} of them not as they should be")
     if out is not None:
-        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            file.write(f"# mtm-hil faults -n {seeds} --seed {seed} --out {out}\n")
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(
-                ("wire", "fault", "loss", "seed", "stops", "is_fresh", "is_read", "silent_deadline_s",
-                 "lost_deadline_s", *(field.name for field in fields(Outcome)))
-            )  # fmt: skip
-            writer.writerows(_row(line) for line in lines)
+        command = f"mtm-hil faults -n {seeds} --seed {seed} --out {out}"
+        write_commented_csv(out, (command,), _COLUMNS, map(_row, lines))
         print(f"wrote {out}")
     return wrong == 0
 

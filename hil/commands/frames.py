@@ -1,15 +1,14 @@
 """`mtm-hil frames`: what framed messages withstand, on simulated log-likelihood ratios."""
 
-import csv
 from pathlib import Path
 
 from rich.console import Console
 
 from hil.experiments.messages.frames import Line, frame_cells, line_of, read_frames
 from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.intervals import clopper_pearson
 from hil.experiments.runs.sweep import run_sweep
-from mtm_onboard.protocol.atomicfile import replacing
 
 _COLUMNS = (
     "what", "code", "check", "check_bits", "distance", "frames", "right", "wrong", "wrong_low", "wrong_high", "tries",
@@ -26,11 +25,8 @@ def frames(count: int, seed: int, workers: int | None, out: Path | None, cells: 
     for line in lines:
         print(_sentence(line))
     if out is not None:
-        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            file.write(f"# mtm-hil frames -n {count} --seed {seed} --out {out}\n")
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(_COLUMNS)
-            writer.writerows(_row(line) for line in lines)
+        command = f"mtm-hil frames -n {count} --seed {seed} --out {out}"
+        write_commented_csv(out, (command,), _COLUMNS, map(_row, lines))
         print(f"wrote {out}")
 
 

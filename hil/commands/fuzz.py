@@ -1,6 +1,5 @@
 """`mtm-hil fuzz`: damaged traffic into every end of every wire."""
 
-import csv
 from pathlib import Path
 
 from rich.console import Console
@@ -8,8 +7,10 @@ from rich.console import Console
 from hil.experiments.hardening.fuzz import COUNTS, Summary, fuzz_cell, fuzz_cells, summarise
 from hil.experiments.hardening.fuzz_targets import TARGETS
 from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.sweep import run_sweep
-from mtm_onboard.protocol.atomicfile import replacing
+
+_COLUMNS = ("target", *COUNTS, "most_altered_expected", "longest_ms")
 
 
 def fuzz(inputs: int, seed: int, workers: int | None, out: Path | None, cells: Path, console: Console) -> bool:
@@ -28,11 +29,8 @@ def fuzz(inputs: int, seed: int, workers: int | None, out: Path | None, cells: P
         for failure in one.failures[:1]:
             print(failure)
     if out is not None:
-        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            file.write(f"# mtm-hil fuzz -n {inputs} --seed {seed} --out {out}\n")
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(("target", *COUNTS, "most_altered_expected", "longest_ms"))
-            writer.writerows(_row(one) for one in summaries)
+        command = f"mtm-hil fuzz -n {inputs} --seed {seed} --out {out}"
+        write_commented_csv(out, (command,), _COLUMNS, map(_row, summaries))
         print(f"wrote {out}")
     return not any(one.counts[name] for one in summaries for name in ("unsent", "crashes", "deaf"))
 

@@ -1,6 +1,5 @@
 """The benchmark's rows as a table, a file and a picture."""
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from rich.table import Table
 
 from hil.experiments.detectors.bench import DETECTORS, PAPER_SIGMA, Row
 from hil.experiments.detectors.bench_rollout import COHERENCY, GENIE, MATCHED
+from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.proportion import Proportion
 from mtm_onboard.protocol.atomicfile import replacing
 
@@ -41,12 +41,8 @@ def rich_table(rows: Sequence[Row]) -> Table:
 
 def write_csv(path: Path, rows: Sequence[Row], comments: Sequence[str]) -> None:
     """Write the rows after the comments, of which the first is the command line."""
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(f"# {comment}\n" for comment in comments)
-        writer = csv.writer(file, lineterminator="\n")
-        shares = [f"{share}{end}" for share in ("symbol", "message") for end in ("s", "s_correct", *_ends("_percent"))]
-        writer.writerow((*_COLUMNS, *shares))
-        writer.writerows(_csv_cells(row) for row in _ordered(rows))
+    shares = [f"{share}{end}" for share in ("symbol", "message") for end in ("s", "s_correct", *_ends("_percent"))]
+    write_commented_csv(path, comments, (*_COLUMNS, *shares), (_csv_cells(row) for row in _ordered(rows)))
 
 
 def draw_plot(path: Path, rows: Sequence[Row]) -> None:

@@ -1,6 +1,5 @@
 """The paper's job with the noise played by the microcontroller's C code, beside the same rollouts from Python."""
 
-import csv
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,11 +11,11 @@ from hil.experiments.detectors.bench import FIRST_SEED, PAPER_SIGMA
 from hil.experiments.detectors.bench_recording import Job, record
 from hil.experiments.detectors.bench_rollout import job_of, plant_of, read_matched
 from hil.experiments.runs.cells import Cell, CellStore, Scalar, Values
+from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.proportion import Proportion
 from hil.experiments.runs.sweep import run_sweep
 from hil.plants.mecanum import MecanumParameters
 from hil.vehicles.shim_modulator import ShimModulator
-from mtm_onboard.protocol.atomicfile import replacing
 
 PYTHON, SHIM = "python", "shim"
 JOB = Job(4, 150, 1, PAPER_SIGMA)
@@ -72,14 +71,10 @@ def _comparison(results: Sequence[Values]) -> Comparison:
 def write_csv(path: Path, comparison: Comparison, comments: Sequence[str]) -> None:
     """Write the three shares after the comments, of which the first is the command line."""
     shares = {PYTHON: comparison.python, SHIM: comparison.shim, "same symbols from both": comparison.same}
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(f"# {comment}\n" for comment in comments)
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(
-            ("played_by", "message_ticks", "rollouts", "messages", "percent", "percent_low", "percent_high")
-        )
-        for name, share in shares.items():
-            percents = (share.percent, *share.interval_percent)
-            writer.writerow(
-                (name, JOB.window_ticks, share.trials, share.successes, *(f"{percent:.2f}" for percent in percents))
-            )
+    columns = ("played_by", "message_ticks", "rollouts", "messages", "percent", "percent_low", "percent_high")
+    write_commented_csv(path, comments, columns, [_csv_row(name, share) for name, share in shares.items()])
+
+
+def _csv_row(name: str, share: Proportion) -> tuple[object, ...]:
+    percents = (f"{percent:.2f}" for percent in (share.percent, *share.interval_percent))
+    return name, JOB.window_ticks, share.trials, share.successes, *percents
