@@ -43,7 +43,7 @@ def bench(options: BenchOptions, console: Console) -> None:
     console.print(rich_table(rows))
     print("\n".join(said))
     if options.out is not None:
-        write_csv(options.out, rows, (_command(options), f"{plant}", *said))
+        write_csv(options.out, rows, _command(options), (f"{plant}", *said))
         print(f"wrote {options.out}")
     if options.plot is not None:
         draw_plot(options.plot, rows)

@@ -6,7 +6,7 @@ from pathlib import Path
 from rich.console import Console
 
 from hil.experiments.hardening.endurance import SYMBOLS, Checkpoint, endure
-from hil.experiments.runs.commented_csv import write_commented_csv
+from hil.experiments.runs.result_file import write_result_csv
 
 
 def endurance(hours: float, checkpoints: int, seed: int, out: Path | None, console: Console) -> None:
@@ -21,7 +21,7 @@ def endurance(hours: float, checkpoints: int, seed: int, out: Path | None, conso
         )
     if out is not None:
         command = f"mtm-hil endurance --hours {hours:g} --checkpoints {checkpoints} --seed {seed} --out {out}"
-        write_commented_csv(out, (command,), [field.name for field in fields(Checkpoint)], map(_row, found))
+        write_result_csv(out, command, [field.name for field in fields(Checkpoint)], map(_row, found))
         print(f"wrote {out}")
 
 

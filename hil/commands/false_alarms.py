@@ -7,8 +7,8 @@ from rich.console import Console
 
 from hil.experiments.detectors.false_alarms import NO_MESSAGE, WRONG_KEY, decode_nothing, false_alarm_cells, summarise
 from hil.experiments.runs.cells import CellStore
-from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 
 _COLUMNS = ("arm", "detector", "decodes", "decoded", "inconclusive", "ks_p", "level", "below", "low", "high")
@@ -41,5 +41,5 @@ def false_alarms(
             )  # fmt: skip
     if out is not None:
         command = f"mtm-hil false-alarms -n {decodes} --detector {detector} --seed {seed} --out {out}"
-        write_commented_csv(out, (command,), _COLUMNS, rows)
+        write_result_csv(out, command, _COLUMNS, rows)
         print(f"wrote {out}")

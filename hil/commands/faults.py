@@ -7,7 +7,7 @@ from rich.console import Console
 
 from hil.experiments.hardening.faults import Line, Outcome, fault_cell, fault_cells, line_of
 from hil.experiments.runs.cells import CellStore
-from hil.experiments.runs.commented_csv import write_commented_csv
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 
 _NO_LOSS = "no"
@@ -29,7 +29,7 @@ def faults(seeds: int, seed: int, workers: int | None, out: Path | None, cells: 
     print(f"{len(lines)} runs, {wrong} of them not as they should be")
     if out is not None:
         command = f"mtm-hil faults -n {seeds} --seed {seed} --out {out}"
-        write_commented_csv(out, (command,), _COLUMNS, map(_row, lines))
+        write_result_csv(out, command, _COLUMNS, map(_row, lines))
         print(f"wrote {out}")
     return wrong == 0
 

@@ -6,8 +6,8 @@ from rich.console import Console
 
 from hil.experiments.messages.frames import Line, frame_cells, line_of, read_frames
 from hil.experiments.runs.cells import CellStore
-from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 
 _COLUMNS = (
@@ -26,7 +26,7 @@ def frames(count: int, seed: int, workers: int | None, out: Path | None, cells: 
         print(_sentence(line))
     if out is not None:
         command = f"mtm-hil frames -n {count} --seed {seed} --out {out}"
-        write_commented_csv(out, (command,), _COLUMNS, map(_row, lines))
+        write_result_csv(out, command, _COLUMNS, map(_row, lines))
         print(f"wrote {out}")
 
 

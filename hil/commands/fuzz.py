@@ -7,7 +7,7 @@ from rich.console import Console
 from hil.experiments.hardening.fuzz import COUNTS, Summary, fuzz_cell, fuzz_cells, summarise
 from hil.experiments.hardening.fuzz_targets import TARGETS
 from hil.experiments.runs.cells import CellStore
-from hil.experiments.runs.commented_csv import write_commented_csv
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 
 _COLUMNS = ("target", *COUNTS, "most_altered_expected", "longest_ms")
@@ -30,7 +30,7 @@ def fuzz(inputs: int, seed: int, workers: int | None, out: Path | None, cells: P
             print(failure)
     if out is not None:
         command = f"mtm-hil fuzz -n {inputs} --seed {seed} --out {out}"
-        write_commented_csv(out, (command,), _COLUMNS, map(_row, summaries))
+        write_result_csv(out, command, _COLUMNS, map(_row, summaries))
         print(f"wrote {out}")
     return not any(one.counts[name] for one in summaries for name in ("unsent", "crashes", "deaf"))
 

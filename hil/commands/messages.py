@@ -6,8 +6,8 @@ from rich.console import Console
 
 from hil.experiments.messages.jobs import JOBS, payload_bps, receive
 from hil.experiments.runs.cells import Cell, CellStore
-from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 
 _COLUMNS = ("job", "payload_bps", "rollouts", "received", "share", "low", "high", "wrong")
@@ -33,5 +33,5 @@ def messages(rollouts: int, seed: int, workers: int | None, out: Path | None, ce
             shares = [f"{value:.5f}" for value in (received / count, low, high)]
             rows.append((name, f"{payload_bps(job):.4f}", count, received, *shares, wrong))
     if out is not None:
-        write_commented_csv(out, (f"mtm-hil messages -n {rollouts} --seed {seed} --out {out}",), _COLUMNS, rows)
+        write_result_csv(out, f"mtm-hil messages -n {rollouts} --seed {seed} --out {out}", _COLUMNS, rows)
         print(f"wrote {out}")

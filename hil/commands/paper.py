@@ -60,8 +60,7 @@ def paper_robomaster(rollouts: int, out: Path | None, cells: Path, console: Cons
         rows = measure(plant, rollouts, store, console)
     console.print(rich_table(rows))
     if out is not None:
-        command = f"mtm-hil paper robomaster -n {rollouts} --out {out}"
-        write_csv(out, rows, (command, f"{plant}"))
+        write_csv(out, rows, f"mtm-hil paper robomaster -n {rollouts} --out {out}", (f"{plant}",))
         print(f"wrote {out}")
 
 
@@ -84,7 +83,7 @@ def paper_world(world: str, options: WorldOptions, console: Console) -> None:
     print(summary)
     if options.out is not None:
         took = f"its cells took {seconds / 60:.0f} minutes of one core"
-        world_report.write_csv(options.out, rows, (options.command(world), took, summary, *world_report.remarks(world)))
+        world_report.write_csv(options.out, rows, options.command(world), (took, summary, *world_report.remarks(world)))
         print(f"wrote {options.out}")
 
 
@@ -113,7 +112,7 @@ def paper_null(options: WorldOptions, console: Console) -> None:
             tables.append((world, rows))
             console.print(world_report.rich_table(world, rows))
     if options.out is not None:
-        world_report.write_null_csv(options.out, tables, (options.command("null"),))
+        world_report.write_null_csv(options.out, tables, options.command("null"))
         print(f"wrote {options.out}")
 
 
@@ -125,7 +124,7 @@ def paper_performance(options: WorldOptions, console: Console) -> None:
         rows = world_conduct.measure(NAMES, rollouts, options.first_seed, store, console, options.workers)
     console.print(world_conduct.rich_table(rows))
     if options.out is not None:
-        world_conduct.write_csv(options.out, rows, (options.command("performance"),))
+        world_conduct.write_csv(options.out, rows, options.command("performance"))
         print(f"wrote {options.out}")
 
 

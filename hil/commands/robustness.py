@@ -7,8 +7,8 @@ from rich.console import Console
 
 from hil.experiments.detectors.robustness import CONDITIONS, JOBS, read_under
 from hil.experiments.runs.cells import Cell, CellStore
-from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 
 _COLUMNS = (
@@ -32,5 +32,5 @@ def robustness(rollouts: int, seed: int, workers: int | None, out: Path | None, 
                 accuracy = [f"{value:.5f}" for value in (right / read, low, high)]
                 rows.append((job.alphabet_size, job.ticks, job.windows, name, rollouts, read, right, *accuracy))
     if out is not None:
-        write_commented_csv(out, (f"mtm-hil robustness -n {rollouts} --seed {seed} --out {out}",), _COLUMNS, rows)
+        write_result_csv(out, f"mtm-hil robustness -n {rollouts} --seed {seed} --out {out}", _COLUMNS, rows)
         print(f"wrote {out}")

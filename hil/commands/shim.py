@@ -24,7 +24,7 @@ def shim(rollouts: int, out: Path | None, cells: Path, console: Console) -> None
     print(f"played by the C shim:   {_share(found.shim)}")
     print(f"same symbols from both: {_share(found.same)}; {apart}")
     if out is not None:
-        write_csv(out, found, (f"mtm-hil shim -n {rollouts} --out {out}", f"{plant}", apart))
+        write_csv(out, found, f"mtm-hil shim -n {rollouts} --out {out}", (f"{plant}", apart))
         print(f"wrote {out}")
 
 

@@ -10,8 +10,8 @@ from rich.table import Table
 
 from hil.experiments.detectors.bench import DETECTORS, PAPER_SIGMA, Row
 from hil.experiments.detectors.bench_rollout import COHERENCY, GENIE, MATCHED
-from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.proportion import Proportion
+from hil.experiments.runs.result_file import write_result_csv
 from mtm_onboard.protocol.atomicfile import replacing
 
 _COLUMNS = ("alphabet_size", "window_ticks", "windows", "sigma", "detector", "rollouts")
@@ -39,10 +39,10 @@ def rich_table(rows: Sequence[Row]) -> Table:
     return table
 
 
-def write_csv(path: Path, rows: Sequence[Row], comments: Sequence[str]) -> None:
-    """Write the rows after the comments, of which the first is the command line."""
+def write_csv(path: Path, rows: Sequence[Row], command: str, notes: Sequence[str]) -> None:
+    """Write the rows under the command line and the notes."""
     shares = [f"{share}{end}" for share in ("symbol", "message") for end in ("s", "s_correct", *_ends("_percent"))]
-    write_commented_csv(path, comments, (*_COLUMNS, *shares), (_csv_cells(row) for row in _ordered(rows)))
+    write_result_csv(path, command, (*_COLUMNS, *shares), (_csv_cells(row) for row in _ordered(rows)), notes)
 
 
 def draw_plot(path: Path, rows: Sequence[Row]) -> None:

@@ -12,8 +12,8 @@ from hil.experiments.detectors import paper_figures
 from hil.experiments.detectors.paper_figures import PaperFigure
 from hil.experiments.detectors.robomaster_rollout import NO_MESSAGE, SENT, WRONG_KEY, decode_rollout, rollout_parameters
 from hil.experiments.runs.cells import Cell, CellStore, Values
-from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.proportion import Proportion
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 from hil.plants.mecanum import MecanumParameters
 
@@ -95,13 +95,13 @@ def rich_table(rows: Sequence[Row]) -> Table:
     return table
 
 
-def write_csv(path: Path, rows: Sequence[Row], comments: Sequence[str]) -> None:
-    """Write the rows after the comments, of which the first is the command line."""
+def write_csv(path: Path, rows: Sequence[Row], command: str, notes: Sequence[str]) -> None:
+    """Write the rows under the command line and the notes."""
     columns = ("arm", "message_ticks", "rollouts", "symbols", "symbols_correct", "symbol_percent", "symbol_percent_low",
              "symbol_percent_high", "paper_symbol_percent", "messages_correct", "message_percent",
              "message_percent_low", "message_percent_high", "paper_message_percent", "margin",
              "margin_standard_error", "paper_margin")  # fmt: skip
-    write_commented_csv(path, comments, columns, (_csv_cells(row) for row in rows))
+    write_result_csv(path, command, columns, (_csv_cells(row) for row in rows), notes)
 
 
 def _csv_cells(row: Row) -> tuple[object, ...]:

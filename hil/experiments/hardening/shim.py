@@ -11,8 +11,8 @@ from hil.experiments.detectors.bench import FIRST_SEED, PAPER_SIGMA
 from hil.experiments.detectors.bench_recording import Job, record
 from hil.experiments.detectors.bench_rollout import job_of, plant_of, read_matched
 from hil.experiments.runs.cells import Cell, CellStore, Scalar, Values
-from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.proportion import Proportion
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 from hil.plants.mecanum import MecanumParameters
 from hil.vehicles.shim_modulator import ShimModulator
@@ -68,11 +68,11 @@ def _comparison(results: Sequence[Values]) -> Comparison:
     return Comparison(share(PYTHON), share(SHIM), share("same"), (float(np.median(apart_m)), max(apart_m)))
 
 
-def write_csv(path: Path, comparison: Comparison, comments: Sequence[str]) -> None:
-    """Write the three shares after the comments, of which the first is the command line."""
+def write_csv(path: Path, comparison: Comparison, command: str, notes: Sequence[str]) -> None:
+    """Write the three shares under the command line and the notes."""
     shares = {PYTHON: comparison.python, SHIM: comparison.shim, "same symbols from both": comparison.same}
     columns = ("played_by", "message_ticks", "rollouts", "messages", "percent", "percent_low", "percent_high")
-    write_commented_csv(path, comments, columns, [_csv_row(name, share) for name, share in shares.items()])
+    write_result_csv(path, command, columns, [_csv_row(name, share) for name, share in shares.items()], notes)
 
 
 def _csv_row(name: str, share: Proportion) -> tuple[object, ...]:

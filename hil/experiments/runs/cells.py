@@ -1,21 +1,18 @@
 """Cells of a sweep, and the file that keeps what they gave."""
 
-import hashlib
 import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from hil.experiments.runs.fingerprint import code_fingerprint
 from mtm_onboard.protocol import MtmError
 
 Scalar = str | int | float | bool
 Values = Mapping[str, Scalar]
-
-_PACKAGES = ("mtm_onboard", "mtm_audit", "hil")
 
 
 @dataclass(frozen=True)
@@ -30,17 +27,6 @@ class Cell:
     def name(self) -> str:
         """The same text for the same cell, whatever the order of its parameters."""
         return json.dumps([self.experiment, self.parameters, self.seed], sort_keys=True)
-
-
-@cache
-def code_fingerprint() -> str:
-    """Sixteen hexadecimal digits that differ when any Python file of the project does."""
-    root = Path(__file__).parents[3]
-    digest = hashlib.sha256()
-    for package in _PACKAGES:
-        for path in sorted((root / package).rglob("*.py")):
-            digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()[:16]
 
 
 class CellStore:

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hil.experiments.runs.cells import Cell, CellStore, Scalar, Values
-from hil.experiments.runs.commented_csv import write_commented_csv
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 from hil.experiments.worlds.points import SAME, headline_point
 from hil.worlds.noise import keyed_noise, white_noise
@@ -147,11 +147,11 @@ def _cell(row: Measure | None) -> str:
     return f"{row.mean:.4g}±{row.deviation:.3g}" + (f" ({row.paper})" if row.paper else "")
 
 
-def write_csv(path: Path, rows: Sequence[Measure], comments: Sequence[str]) -> None:
-    """Write the rows after the comments, of which the first is the command line."""
+def write_csv(path: Path, rows: Sequence[Measure], command: str) -> None:
+    """Write the rows under the command line."""
     columns = ("world", "measure", "condition", "rollouts", "mean", "standard_deviation", "paper")
     cells = [
         (row.world, row.name, row.condition, row.rollouts, f"{row.mean:.5g}", f"{row.deviation:.4g}", row.paper)
         for row in rows
     ]
-    write_commented_csv(path, comments, columns, cells)
+    write_result_csv(path, command, columns, cells)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from rich.table import Table
 
-from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.intervals import clopper_pearson
 from hil.experiments.runs.proportion import Proportion
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.worlds.points import PaperCell, headline_point
 from hil.experiments.worlds.reading import COHERENCY
 from hil.experiments.worlds.rollout import NO_MESSAGE, SENT
@@ -101,7 +101,7 @@ def shortest_messages(rows: Sequence[Row]) -> str:
     )
 
 
-def write_null_csv(path: Path, tables: Sequence[tuple[str, Sequence[Row]]], comments: Sequence[str]) -> None:
+def write_null_csv(path: Path, tables: Sequence[tuple[str, Sequence[Row]]], command: str) -> None:
     """Write the null conditions of all worlds, with whether each interval covers chance, 1 / M."""
     columns = (
         "world", "arm", "arrangement", "alphabet_size", "message_ticks", "detector", "symbols", "symbols_correct",
@@ -109,7 +109,7 @@ def write_null_csv(path: Path, tables: Sequence[tuple[str, Sequence[Row]]], comm
         "paper_symbol_percent",
     )  # fmt: skip
     cells = [_null_cells(world, row) for world, rows in tables for row in rows if row.goals is None]
-    write_commented_csv(path, comments, columns, cells)
+    write_result_csv(path, command, columns, cells)
 
 
 def _null_cells(world: str, row: Row) -> tuple[object, ...]:
@@ -122,9 +122,9 @@ def _null_cells(world: str, row: Row) -> tuple[object, ...]:
     )  # fmt: skip
 
 
-def write_csv(path: Path, rows: Sequence[Row], comments: Sequence[str]) -> None:
-    """Write the rows after the comments, of which the first is the command line."""
-    write_commented_csv(path, comments, _COLUMNS, (_cells(row) for row in rows))
+def write_csv(path: Path, rows: Sequence[Row], command: str, notes: Sequence[str]) -> None:
+    """Write the rows under the command line and the notes."""
+    write_result_csv(path, command, _COLUMNS, (_cells(row) for row in rows), notes)
 
 
 def _cells(row: Row) -> tuple[object, ...]:

@@ -144,6 +144,7 @@ def test_the_table_comes_from_the_finished_cells_and_a_bad_one_is_told(tmp_path,
     assert "81 runs, 1 of them not as they should be" in capsys.readouterr().out
     with out.open() as file:
         assert next(file).startswith("# mtm-hil faults -n 1 --seed 0 --out ")
+        assert next(file).startswith("# code ")
         rows = list(csv.DictReader(file))
     assert [row["fault"] for row in rows if row["stops"] == "False"] == ["drop"]
     assert {row["lost_deadline_s"] for row in rows if row["wire"] == "plaintext"} == {"none"}

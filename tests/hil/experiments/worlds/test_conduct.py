@@ -43,7 +43,7 @@ def test_the_arm_s_return_is_measured_beside_the_paper_s(tmp_path):
     returns = {row.condition: row for row in rows if row.name == "50-step return"}
     assert returns[KEYED].paper == "-4.15±1.23"
     assert -20.0 < returns[KEYED].mean < 0.0
-    write_csv(tmp_path / "conduct.csv", rows, ("made by hand",))
+    write_csv(tmp_path / "conduct.csv", rows, "made by hand")
     assert "reacher,50-step return,watermarked,2," in (tmp_path / "conduct.csv").read_text()
 
 
