@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.hardening.faults import Line, Outcome, fault_cell, fault_cells, line_of
+from hil.experiments.hardening.faults import Line, Outcome, fault_cell, fault_cells, row_of
 from hil.experiments.runs.cells import CellStore
 from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
@@ -22,7 +22,7 @@ def faults(seeds: int, seed: int, workers: int | None, out: Path | None, cells: 
     asked = fault_cells(seeds, seed)
     with CellStore(cells) as store:
         results = run_sweep(fault_cell, asked, store, console, workers)
-    lines = [line_of(cell, result) for cell, result in zip(asked, results, strict=True)]
+    lines = [row_of(cell, result) for cell, result in zip(asked, results, strict=True)]
     for line in lines:
         print(_sentence(line))
     wrong = sum(not (line.stops and line.is_fresh and line.is_read) for line in lines)

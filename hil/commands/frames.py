@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.messages.frames import Line, frame_cells, line_of, read_frames
+from hil.experiments.messages.frames import Line, frame_cells, read_frames, row_of
 from hil.experiments.runs.cells import CellStore
 from hil.experiments.runs.intervals import clopper_pearson
 from hil.experiments.runs.result_file import write_result_csv
@@ -21,7 +21,7 @@ def frames(count: int, seed: int, workers: int | None, out: Path | None, cells: 
     plans = frame_cells(count, seed)
     with CellStore(cells) as store:
         run_sweep(read_frames, [cell for plan in plans for cell in plan], store, console, workers)
-        lines = [line_of(plan, run_sweep(read_frames, plan, store, console, 1)) for plan in plans]
+        lines = [row_of(plan, run_sweep(read_frames, plan, store, console, 1)) for plan in plans]
     for line in lines:
         print(_sentence(line))
     if out is not None:

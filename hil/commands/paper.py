@@ -8,7 +8,7 @@ from rich.console import Console
 
 from hil.experiments.detectors.paper_robomaster import measure, rich_table, write_csv
 from hil.experiments.runs.cells import CellStore
-from hil.experiments.worlds import conduct as world_conduct
+from hil.experiments.worlds import performance as world_performance
 from hil.experiments.worlds import report as world_report
 from hil.experiments.worlds.tables import Condition, Effort, Row, conditions_of, null_conditions_of
 from hil.experiments.worlds.tables import measure as measure_world
@@ -121,10 +121,10 @@ def paper_performance(options: WorldOptions, console: Console) -> None:
     _check_simulators()
     rollouts = _QUICK_ROLLOUTS if options.quick else options.rollouts
     with CellStore(options.cells) as store:
-        rows = world_conduct.measure(NAMES, rollouts, options.first_seed, store, console, options.workers)
-    console.print(world_conduct.rich_table(rows))
+        rows = world_performance.measure(NAMES, rollouts, options.first_seed, store, console, options.workers)
+    console.print(world_performance.rich_table(rows))
     if options.out is not None:
-        world_conduct.write_csv(options.out, rows, options.command("performance"))
+        world_performance.write_csv(options.out, rows, options.command("performance"))
         print(f"wrote {options.out}")
 
 

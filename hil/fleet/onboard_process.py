@@ -91,7 +91,7 @@ class OnboardProcess:
         flags, controller = journal.flags, self._wire.controller
         clamped, stale, refused = (int(np.count_nonzero(flags & bit)) for bit in (CLAMPED, STALE, REFUSED))
         median_s, late_s = np.quantile(journal.lateness_s, (0.5, 0.99))
-        is_stopped = controller.demand == STOP and not (self._wire.lets_go and controller.work_mode)
+        is_stopped = controller.demand == STOP and not (self._wire.stop_releases_motors and controller.work_mode)
         return RobotReport(
             self.name, sent, missed, clamped, stale, refused, self._wire.faults(),
             controller.deadman_stops, is_stopped, (float(median_s), float(late_s)),

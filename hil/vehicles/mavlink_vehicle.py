@@ -21,7 +21,7 @@ _CUSTOM_MODE, _ARMED = 1, 128  # MAV_MODE_FLAG
 _ACCEPTED, _REJECTED_FOR_NOW, _UNSUPPORTED, _FAILED = 0, 1, 3, 4  # MAV_RESULT
 _CRITICAL = 2  # MAV_SEVERITY
 _ACTIVE = 4  # MAV_STATE
-_MOST_READS = 256
+_MAX_READS = 256
 # A push that is due within this part of a period counts as due: instants are sums of decimal fractions.
 _SLACK = 1e-6
 
@@ -102,7 +102,7 @@ class MavlinkVehicle:
     def _received(self) -> list[Any]:
         found: list[Any] = []
         try:
-            for _ in range(_MOST_READS):
+            for _ in range(_MAX_READS):
                 data = self._port.read()
                 if not data:
                     break

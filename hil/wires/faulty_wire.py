@@ -17,7 +17,7 @@ from mtm_onboard.links.robomaster_messages import FROM_COMPANION_ID, FROM_MOTION
 from mtm_onboard.model.clock import Clock
 from mtm_onboard.protocol import MtmError
 
-_MOST_BYTES_CHANGED = 3
+_MAX_BYTES_CHANGED = 3
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,7 @@ def _all_of(direction: Direction) -> bytes:
 
 def _corrupted(draw: random.Random, unit: bytes) -> bytes:
     changed = bytearray(unit)
-    for _ in range(draw.randint(1, _MOST_BYTES_CHANGED)):
+    for _ in range(draw.randint(1, _MAX_BYTES_CHANGED)):
         if changed:
             changed[draw.randrange(len(changed))] ^= draw.randint(1, 255)
     return bytes(changed)

@@ -13,7 +13,7 @@ from gymnasium.envs.box2d import lunar_lander
 
 from hil.worlds.lander_pictures import drawn, rendered
 from hil.worlds.lander_states import state_of
-from hil.worlds.world import Conduct, Integers, Rollout, Shot
+from hil.worlds.world import ControlHistory, Integers, Rollout, Shot
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.track import Floats
 from mtm_audit.tracking.registry import Tracker
@@ -29,7 +29,7 @@ WARM_UP_TICKS = 150
 # so that accuracies come near the paper's at M = 8 with T = 192 and 288; at T = 96 they lie well above the paper's. A
 # lightly damped turn lets the side engine's noise across its dead zone of a half; a stiff lift, which runs the main
 # engine's command into its limits in a third of all ticks, fights the noise as the paper's loop does.
-LEAN_PER_M, LEAN_PER_MPS, MOST_LEAN_RAD = 0.03, 0.1, 0.3
+LEAN_PER_M, LEAN_PER_MPS, MAX_LEAN_RAD = 0.03, 0.1, 0.3
 TURN_PER_RAD, TURN_PER_RADPS = 10.0, 1.0
 LIFT_PER_M, LIFT_PER_MPS = 10.0, 6.0
 # Half power of the main engine does not carry the lander; this does, about.
@@ -45,8 +45,8 @@ _STREAM = 23
 class LunarLander:
     """One lander hovers over eight pads in turn: each a descent of its own, of which the hover is filmed.
 
-    An environment that Gymnasium ends (by touching the moon or by leaving the picture at a side) is flown on and
-    filmed, as nobody could tell the camera to forget it; `run` counts such goals in the score "ended goals".
+    When Gymnasium ends an environment (the lander touches the moon or leaves the picture at a side), the rollout goes
+    on and is filmed all the same, since a camera would film it too; `run` counts such goals in the score "ended goals".
     """
 
     name = "lunar-lander"
@@ -66,10 +66,10 @@ class LunarLander:
         environment = lunar_lander.LunarLander(continuous=True)
         return [_rollout(environment, pads, added, seed) for pads, added, seed in zip(goals, noise, seeds, strict=True)]
 
-    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[Conduct]:
+    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[ControlHistory]:
         """Descend and land between the flags, under noise until both legs stand on the ground.
 
-        There the engines are shut off, or their noise would keep the lander from the rest that Gymnasium waits for.
+        Then the engines are shut off: their noise would keep the lander moving, and Gymnasium waits until it rests.
         The score "episodic return" is the sum of Gymnasium's rewards until it ends the episode or `noise` does.
         """
         environment = lunar_lander.LunarLander(continuous=True)
@@ -109,7 +109,7 @@ def landing_action(body: Body, ground_y_m: float) -> tuple[float, float]:
 
 def _side(body: Body, pad_x_m: float, lean_per_m: float, lean_per_mps: float) -> float:
     lean_rad = lean_per_m * (body.position.x - pad_x_m) + lean_per_mps * body.linearVelocity.x
-    error_rad = body.angle - _limited(lean_rad, MOST_LEAN_RAD)
+    error_rad = body.angle - _limited(lean_rad, MAX_LEAN_RAD)
     return _limited(TURN_PER_RAD * error_rad + TURN_PER_RADPS * body.angularVelocity, 1.0)
 
 
@@ -126,7 +126,7 @@ def _rollout(environment: lunar_lander.LunarLander, pads: Integers, noise: Float
         shots.append(Shot(number * ticks, first_s + np.arange(ticks + 1) / LunarLander.rate_hz, states))
         bases.append(base)
         ended += lost
-    return Rollout(tuple(shots), _conduct(np.concatenate(bases), noise.reshape(-1, 2), {"ended goals": float(ended)}))
+    return Rollout(tuple(shots), _history(np.concatenate(bases), noise.reshape(-1, 2), {"ended goals": float(ended)}))
 
 
 def _descent(
@@ -149,7 +149,7 @@ def _descent(
     return np.stack(states), base, lost
 
 
-def _landing(environment: lunar_lander.LunarLander, noise: Floats, seed: int) -> Conduct:
+def _landing(environment: lunar_lander.LunarLander, noise: Floats, seed: int) -> ControlHistory:
     environment.render_mode = None
     environment.reset(seed=_environment_seed([seed]))
     ground_y_m = environment.helipad_y + lunar_lander.LEG_DOWN / lunar_lander.SCALE
@@ -162,12 +162,12 @@ def _landing(environment: lunar_lander.LunarLander, noise: Floats, seed: int) ->
         total += float(reward)
         if ended:
             break
-    return _conduct(np.array(base), np.array(added), {"episodic return": total})
+    return _history(np.array(base), np.array(added), {"episodic return": total})
 
 
-def _conduct(base: Floats, noise: Floats, scores: dict[str, float]) -> Conduct:
+def _history(base: Floats, noise: Floats, scores: dict[str, float]) -> ControlHistory:
     asked = base + noise
-    return Conduct(base, asked, np.clip(asked, -1.0, 1.0), scores)
+    return ControlHistory(base, asked, np.clip(asked, -1.0, 1.0), scores)
 
 
 def _environment_seed(parts: Sequence[int]) -> int:

@@ -14,7 +14,7 @@ from mtm_audit.model.track import Floats
 TERRAIN_POINTS = 11
 BODIES = 3
 # A particle lives for at most seven pictures, and two are born in a tick.
-MOST_PARTICLES = 16
+MAX_PARTICLES = 16
 FADING_PER_PICTURE = 0.15
 
 
@@ -26,7 +26,7 @@ def state_of(environment: lunar_lander.LunarLander) -> Floats:
     terrain = [polygon[0][1] for polygon in environment.sky_polys] + [environment.sky_polys[-1][1][1]]
     bodies = [(*body.position, body.angle) for body in environment.drawlist]
     flames = [(*particle.position, particle.ttl) for particle in environment.particles]
-    flames += [(math.nan,) * 3] * (MOST_PARTICLES - len(flames))
+    flames += [(math.nan,) * 3] * (MAX_PARTICLES - len(flames))
     return np.concatenate([terrain, np.ravel(bodies), np.ravel(flames)])
 
 

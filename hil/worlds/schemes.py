@@ -1,4 +1,4 @@
-"""The paper's schemes of the four simulated worlds."""
+"""The paper's schemes of the four simulated worlds (its Section "Design Space": single, same, split)."""
 
 from dataclasses import dataclass
 

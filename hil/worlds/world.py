@@ -1,4 +1,9 @@
-"""What every simulated world gives: rollouts of its task under any noise, and pictures of them."""
+"""What every simulated world gives: rollouts of its task under any noise, and pictures of them.
+
+The worlds are those of the paper's Section "Results"; its appendix "Policy and Controller Details" says how they are
+driven. A world steps its own simulator under a noise array that was computed before: neither the onboard loop nor its
+guard nor a wire is part of it (see docs/worlds.md).
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,25 +34,25 @@ class Shot:
 
 
 @dataclass(frozen=True)
-class Conduct:
-    """How a rollout was driven, tick by tick.
+class ControlHistory:
+    """The commands of a rollout, tick by tick.
 
-    `base` (n, axes) is what the task asked for, `asked` (n, axes) the same with the noise, `sent` (n, axes) what was
-    left of that within the limits; `scores` are the paper's measures of the task, by name.
+    `base` (n, axes) is the task controller's command, `requested` (n, axes) the same with the noise, `applied` (n,
+    axes) what the world's limits left of that; `scores` are the paper's measures of the task, by name.
     """
 
     base: Floats
-    asked: Floats
-    sent: Floats
+    requested: Floats
+    applied: Floats
     scores: Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class Rollout:
-    """One run of the task: what the camera saw, in order, and how it was driven (off camera ticks left out)."""
+    """One run of the task: its filmed shots in order, and its commands without the ticks that were not filmed."""
 
     shots: tuple[Shot, ...]
-    conduct: Conduct
+    control: ControlHistory
 
 
 class World(Protocol):
@@ -74,7 +79,7 @@ class World(Protocol):
         """
         ...
 
-    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[Conduct]:
+    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[ControlHistory]:
         """Do the paper's task once for each seed under `noise` (rollouts, task_ticks, axes), unfilmed."""
         ...
 
@@ -92,7 +97,7 @@ class World(Protocol):
 
 
 def check_axes(world: World, scheme: Scheme) -> None:
-    """Raise MtmError when the scheme has an axis that the world has not."""
+    """Raise MtmError when the scheme uses an axis that the world does not have."""
     used = [f"{channel.body}.{axis}" for channel in scheme.channels for axis in channel.axes]
     foreign = [axis for axis in used if axis not in world.axes]
     if foreign:

@@ -1,4 +1,4 @@
-"""The benchmark: the paper's detector, the matched one and the genie on the same recordings.
+"""The benchmark: the paper's detector, the matched one and the genie (the oracle) on the same recordings.
 
 Two jobs: the paper's (one 2-bit symbol a robot) over the window length, and sustained sending (eight symbols in a row
 of a larger alphabet); both at one window length over sigma as well.
@@ -79,7 +79,7 @@ def measure(
     silences: int,
     workers: int | None = None,
 ) -> list[Row]:
-    """Measure all detectors under the given conditions; `silences` teach the genie the interference."""
+    """Measure all detectors under the given conditions; the genie's interference is fitted to `silences` recordings."""
     groups = [
         [_cell(condition, plant, silences, number) for number in range(condition.rollouts)] for condition in asked
     ]

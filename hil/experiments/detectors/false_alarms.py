@@ -19,8 +19,8 @@ from hil.fleet.rig import RunSettings
 from hil.plants.mecanum import calibrated_parameters
 from hil.sensors.motion_capture import MotionCapture
 from hil.sensors.optics import Optics
-from hil.worlds.errands import any_errand
 from hil.worlds.robomaster import ROBOTS, fleet_scheme
+from hil.worlds.tasks import random_task
 from mtm_audit.decoding.decode import DecodeSettings, decode_tracks
 from mtm_audit.model.track import Floats, Track
 from mtm_onboard.protocol import Channel, Key, Scheme
@@ -98,14 +98,14 @@ def _recorded(played: Key, sent: tuple[int, ...] | None, seed: int, draw: np.ran
     length_s = float(draw.uniform(window_s, max(1.2 * window_s, most_s)))
     begin_s = float(draw.uniform(0.3, 8.0))
     settings = RunSettings(
-        played, sent, begin_s + length_s + 0.2, seed, wire="direct", start_s=0.2, task=any_errand,
+        played, sent, begin_s + length_s + 0.2, seed, wire="direct", start_s=0.2, task=random_task,
         plant=calibrated_parameters(),
     )  # fmt: skip
     rate_hz, dropouts = float(draw.choice((25.0, 30.0, 50.0, 100.0))), float(draw.choice((0.0, 0.05)))
     system = MotionCapture(rate_hz=rate_hz, dropout_probability=dropouts)
     tracks = motion_capture_tracks(run_lockstep(settings), seed, system)
     camera = _camera(draw)
-    return [_seen(_cut(track, begin_s, begin_s + length_s), camera, draw) for track in tracks]
+    return [_observed_track(_cut(track, begin_s, begin_s + length_s), camera, draw) for track in tracks]
 
 
 def summarise(arm: str, results: Sequence[Values]) -> Summary:
@@ -137,7 +137,7 @@ def _camera(draw: np.random.Generator) -> Optics:
     return Optics(position_m, target_m, _PIXELS_PER_M * distance_m, roll_rad=roll_rad, mirrored=mirrored)
 
 
-def _seen(track: Track, camera: Optics, draw: np.random.Generator) -> Track:
+def _observed_track(track: Track, camera: Optics, draw: np.random.Generator) -> Track:
     """The track in the picture, y up, with the tracker's noise."""
     ground = np.column_stack([track.positions, np.zeros(len(track.positions))])
     pixels = camera.project(ground) * [1.0, -1.0]

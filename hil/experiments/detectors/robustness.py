@@ -89,7 +89,7 @@ def read_under(parameters: Values, seed: int) -> dict[str, Scalar]:
     settings = RunSettings(key, sent, end_s + 0.2, seed, wire="direct", start_s=_START_S, plant=calibrated_parameters())
     result = run_lockstep(settings)
     observations = [
-        Observation(channel, glimpse_of_track(_seen(trajectory, condition, begin_s, end_s, draw)))
+        Observation(channel, glimpse_of_track(_observed_track(trajectory, condition, begin_s, end_s, draw)))
         for channel, trajectory in zip(channels, result.trajectories, strict=True)
     ]
     onset_s = (_START_S - begin_s) * condition.clock
@@ -107,7 +107,7 @@ def read_under(parameters: Values, seed: int) -> dict[str, Scalar]:
     return {"read": read, "right": right}
 
 
-def _seen(
+def _observed_track(
     trajectory: Trajectory, condition: Condition, begin_s: float, end_s: float, draw: np.random.Generator
 ) -> Track:
     """The robot's track in the picture, in the recording's own clock, y up."""

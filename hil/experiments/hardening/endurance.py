@@ -23,8 +23,8 @@ from hil.sensors.poses import Floats, Trajectory
 from hil.vehicles.can_node import CanMotionController
 from hil.vehicles.motion_controller import MotionController
 from hil.wires.can_line import can_line
-from hil.worlds.errands import ERRANDS
 from hil.worlds.robomaster import Route
+from hil.worlds.tasks import TASKS
 from mtm_audit.detectors import make_detector
 from mtm_audit.detectors.base import Observation
 from mtm_audit.model.glimpse import glimpse_of_track
@@ -89,7 +89,7 @@ def endure(
     detector: str = "matched",
     journal_bytes: int = DEFAULT_MAX_BYTES,
 ) -> list[Checkpoint]:
-    """Run for so long and report at evenly spaced checkpoints; `reached` hears the simulated time of each.
+    """Run for so long and report at evenly spaced checkpoints; `reached` is called with the simulated time of each.
 
     Raises MtmError when checkpoints are less than a minute apart.
     """
@@ -126,7 +126,7 @@ class _Robot:
         ours, theirs = can_line()
         self._node = CanMotionController(MotionController(self._plant), theirs)
         self._link = ReconnectingTransport(lambda: RoboMasterCan(ours), clock)
-        self._task = ERRANDS["orbit"](Route((0.0, 0.0), ()), seed)
+        self._task = TASKS["orbit"](Route((0.0, 0.0), ()), seed)
         rate_hz = _SCHEME.rate_hz
         header = JournalHeader(
             _SCHEME.fingerprint, _KEY.id, "robot0", "robot0", SYMBOLS, True, rate_hz, 0.0, begin_unix_s

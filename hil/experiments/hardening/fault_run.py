@@ -22,8 +22,8 @@ from hil.vehicles.motion_controller import DEADMAN_S, MotionController
 from hil.vehicles.plaintext_node import PlaintextMotionController
 from hil.wires.faulty_wire import FaultyBus, FaultyPort, FaultyText, FaultyTextPort, FaultyWire, WireFaults
 from hil.wires.plaintext_line import LineTransport
-from hil.worlds.errands import ERRANDS
 from hil.worlds.robomaster import Route
+from hil.worlds.tasks import TASKS
 from mtm_onboard.journal.journal import Journal, JournalHeader
 from mtm_onboard.links.base import Transport
 from mtm_onboard.links.mavlink import MavlinkTransport
@@ -111,7 +111,7 @@ def run_fault(
     with Journal(path, _header(key, symbols), threaded=False) as journal:
         ticks = _Ticks(key, symbols, link, journal, plant, seed)
         clock.every(SAMPLE_PERIOD_S, poll)
-        clock.every(link.service_period_s, _once_at_a_time(link.service))
+        clock.every(link.service_period_s, _not_reentrant(link.service))
         link.open()
         clock.every(1.0 / key.scheme.rate_hz, ticks.tick, START_S)
         clock.sleep_until(FAULT_S)
@@ -143,7 +143,7 @@ class _Ticks:
         guard = Guard(LIMITS, Staleness(), noise_sigma=channel.sigma, period_s=1.0 / rate_hz)
         modulator = Modulator(key.codebook(), channel.name, symbols)
         self._runtime = Runtime(modulator, guard, self._source, link, journal)
-        self._task = ERRANDS["orbit"](Route((0.0, 0.0), ()), seed)
+        self._task = TASKS["orbit"](Route((0.0, 0.0), ()), seed)
         self._plant = plant
         self._rate_hz = rate_hz
         self._is_over = False
@@ -166,7 +166,7 @@ def _header(key: Key, symbols: tuple[int, ...]) -> JournalHeader:
     )
 
 
-def _once_at_a_time(service: Callable[[float], None]) -> Callable[[float], None]:
+def _not_reentrant(service: Callable[[float], None]) -> Callable[[float], None]:
     """As one thread would: not again while it is still waiting for something."""
     is_busy = False
 

@@ -141,7 +141,7 @@ def fault_cell(parameters: Values, seed: int) -> dict[str, Scalar]:
     return assess(run, bool(parameters["loss"]), FAULTS[str(parameters["fault"])].most) | _decoded(run, key, draw)
 
 
-def line_of(cell: Cell, result: Values) -> Line:
+def row_of(cell: Cell, result: Values) -> Line:
     """The row of a finished cell."""
     wire, fault, loss = (str(cell.parameters[name]) for name in ("wire", "fault", "loss"))
     late_s = LATE_S if FAULTS[fault].wire != WireFaults() else 0.0

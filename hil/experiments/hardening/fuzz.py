@@ -103,7 +103,7 @@ class _Session:
                 self._feed(data)
             self._feed(target.filler)
             before = len(target.heard)
-            sound = target.last_word()
+            sound = target.probe_message()
             target.made.add(sound)
             self._feed(sound)
             self.counts["deaf"] += sound not in target.heard[before:]

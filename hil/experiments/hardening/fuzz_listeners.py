@@ -24,7 +24,7 @@ from mtm_onboard.links.mavlink_state import VehicleState
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 
 # Takes a message as the bytes that it came in.
-Hears = Callable[[bytes], None]
+OnMessage = Callable[[bytes], None]
 
 
 class FedPort(Port):
@@ -48,12 +48,12 @@ class FedPort(Port):
         """There is nothing to release."""
 
 
-class HearingNode(CanMotionController):
+class CanNodeListener(CanMotionController):
     """The robot on the CAN bus; `stream` is its end of it."""
 
-    def __init__(self, controller: MotionController, bus: LineEnd, hears: Hears) -> None:
+    def __init__(self, controller: MotionController, bus: LineEnd, on_message: OnMessage) -> None:
         super().__init__(controller, bus)
-        self._hears = hears
+        self._on_message = on_message
 
     @property
     def stream(self) -> CanStream:
@@ -61,16 +61,16 @@ class HearingNode(CanMotionController):
         return self._wire
 
     def _obey(self, message: Message, now_s: float) -> None:
-        self._hears(encode(message))
+        self._on_message(encode(message))
         super()._obey(message, now_s)
 
 
-class HearingCan(RoboMasterCan):
+class CanLinkListener(RoboMasterCan):
     """The transport on the CAN bus."""
 
-    def __init__(self, bus: LineEnd, hears: Hears) -> None:
+    def __init__(self, bus: LineEnd, on_message: OnMessage) -> None:
         super().__init__(bus)
-        self._hears = hears
+        self._on_message = on_message
 
     @property
     def failed_checks(self) -> int:
@@ -78,67 +78,67 @@ class HearingCan(RoboMasterCan):
         return 0 if self._stream is None else self._stream.parser.checksum_failures
 
     def _take(self, message: Message, now_s: float) -> None:
-        self._hears(encode(message))
+        self._on_message(encode(message))
         super()._take(message, now_s)
 
 
-class HearingServer(PlaintextMotionController):
+class PlaintextNodeListener(PlaintextMotionController):
     """The plaintext robot, which tells of what it obeys."""
 
-    def __init__(self, controller: MotionController, port: Port, hears: Hears) -> None:
+    def __init__(self, controller: MotionController, port: Port, on_message: OnMessage) -> None:
         super().__init__(controller, [port])
-        self._hears = hears
+        self._on_message = on_message
 
     def _obey(self, port: Port, text: str, now_s: float) -> None:
         before = self.obeyed
         super()._obey(port, text, now_s)
         if self.obeyed > before:
-            self._hears(as_text(text) + b";")
+            self._on_message(as_text(text) + b";")
 
 
-class HearingPlaintext(LineTransport):
+class PlaintextLinkListener(LineTransport):
     """The plaintext transport, which tells of what it does not call malformed."""
 
-    def __init__(self, link: ByteLink, hears: Hears) -> None:
+    def __init__(self, link: ByteLink, on_message: OnMessage) -> None:
         super().__init__(link)
-        self._hears = hears
+        self._on_message = on_message
 
     def _take(self, text: str, now_s: float) -> None:
         before = self.malformed
         super()._take(text, now_s)
         if self.malformed == before and text.strip(" "):
-            self._hears(as_text(text) + b";")
+            self._on_message(as_text(text) + b";")
 
 
-class HearingVehicle(MavlinkVehicle):
+class VehicleListener(MavlinkVehicle):
     """The autopilot."""
 
-    def __init__(self, port: PipeEnd, key: bytes | None, hears: Hears) -> None:
+    def __init__(self, port: PipeEnd, key: bytes | None, on_message: OnMessage) -> None:
         plant = MecanumPlant(calibrated_parameters(), 0)
         super().__init__(COPTER, plant, port, is_guided=True, is_armed=True, signing_key=key, timestamp=signing_time)
-        self._hears = hears
+        self._on_message = on_message
 
     def _take(self, message: Any, now_s: float) -> None:
-        self._hears(bytes(message.get_msgbuf()))
+        self._on_message(bytes(message.get_msgbuf()))
         super()._take(message, now_s)
 
 
-class HearingMavlink(MavlinkTransport):
+class MavlinkLinkListener(MavlinkTransport):
     """The MAVLink transport."""
 
-    def __init__(self, port: PipeEnd, clock: SimulatedClock, hears: Hears) -> None:
+    def __init__(self, port: PipeEnd, clock: SimulatedClock, on_message: OnMessage) -> None:
         super().__init__(profile="copter", clock=clock, open_port=lambda: port)
-        self._vehicle = _HearingState(PROFILES["copter"], hears)
+        self._vehicle = _VehicleStateListener(PROFILES["copter"], on_message)
 
 
-class _HearingState(VehicleState):
-    def __init__(self, profile: Profile, hears: Hears) -> None:
+class _VehicleStateListener(VehicleState):
+    def __init__(self, profile: Profile, on_message: OnMessage) -> None:
         super().__init__(profile, 1)
-        self._hears = hears
+        self._on_message = on_message
 
     def take(self, message: Any, now_s: float) -> bool:
         """Tell of it, then read it."""
-        self._hears(bytes(message.get_msgbuf()))
+        self._on_message(bytes(message.get_msgbuf()))
         return super().take(message, now_s)
 
 

@@ -8,13 +8,13 @@ from collections.abc import Callable
 import can
 
 from hil.experiments.hardening.fuzz_listeners import (
+    CanLinkListener,
+    CanNodeListener,
     FedPort,
-    HearingCan,
-    HearingMavlink,
-    HearingNode,
-    HearingPlaintext,
-    HearingServer,
-    HearingVehicle,
+    MavlinkLinkListener,
+    PlaintextLinkListener,
+    PlaintextNodeListener,
+    VehicleListener,
     as_text,
     idle_controller,
 )
@@ -75,7 +75,7 @@ class Target(ABC):
         """Checksums that were found wrong; 0 for a format without."""
         return 0
 
-    def last_word(self) -> bytes:
+    def probe_message(self) -> bytes:
         """A sound message that this end has to understand whatever came before it."""
         return self.traffic.messages[0]
 
@@ -132,7 +132,7 @@ class CanRobot(_Can):
     def __init__(self) -> None:
         feeder, end = can_line()
         super().__init__(can_to_robot(), feeder)
-        self._node = HearingNode(idle_controller(), end, self.heard.append)
+        self._node = CanNodeListener(idle_controller(), end, self.heard.append)
 
     @property
     def failed_checks(self) -> int:
@@ -152,7 +152,7 @@ class CanLink(_Can):
     def __init__(self) -> None:
         feeder, end = can_line()
         super().__init__(can_from_robot(), feeder)
-        self._link = HearingCan(end, self.heard.append)
+        self._link = CanLinkListener(end, self.heard.append)
         self._link.open()
 
     @property
@@ -181,7 +181,7 @@ class PlaintextRobot(_Plaintext):
     def __init__(self) -> None:
         super().__init__(plaintext_to_robot())
         self._port = FedPort()
-        self._node = HearingServer(idle_controller(), self._port, self.heard.append)
+        self._node = PlaintextNodeListener(idle_controller(), self._port, self.heard.append)
 
     def _arrive(self, draw: random.Random, data: bytes) -> None:
         self._port.waiting += data
@@ -200,7 +200,7 @@ class PlaintextLink(_Plaintext):
     def _connect(self) -> None:
         ours, theirs = socket.socketpair()
         self._port = LinePort(theirs.detach())
-        self._link = HearingPlaintext(ByteLink(ours.detach()), self.heard.append)
+        self._link = PlaintextLinkListener(ByteLink(ours.detach()), self.heard.append)
         self._link.open()
 
     def _arrive(self, draw: random.Random, data: bytes) -> None:
@@ -240,14 +240,14 @@ class Vehicle(_Mavlink):
         feeder, end = byte_pipe()
         super().__init__(mavlink_to_vehicle(key), feeder)
         self._key = key
-        self._vehicle = HearingVehicle(end, key, self.heard.append)
+        self._vehicle = VehicleListener(end, key, self.heard.append)
 
     @property
     def failed_checks(self) -> int:
         """Frames that were damaged in whatever way, of which most had a wrong checksum."""
         return self._vehicle.refused_frames
 
-    def last_word(self) -> bytes:
+    def probe_message(self) -> bytes:
         """Signed later than all the others, or it would count as a replay."""
         codec = MavlinkCodec(1, COMPANION_COMPONENT, self._key, lambda: signing_time() + _LATER)
         return codec.encode(companion_heartbeat(codec.messages))
@@ -264,7 +264,7 @@ class VehicleLink(_Mavlink):
         feeder, end = byte_pipe()
         super().__init__(mavlink_from_vehicle(), feeder)
         self._clock = SimulatedClock()
-        self._link = HearingMavlink(end, self._clock, self.heard.append)
+        self._link = MavlinkLinkListener(end, self._clock, self.heard.append)
         # The first message is the heartbeat of a vehicle that is ready.
         self.stream += self.traffic.messages[0]
         feeder.write(self.traffic.messages[0])

@@ -90,7 +90,7 @@ def frame_cells(frames: int, seed: int) -> list[list[Cell]]:
     return lines
 
 
-def line_of(cells: Sequence[Cell], results: Sequence[Values]) -> Line:
+def row_of(cells: Sequence[Cell], results: Sequence[Values]) -> Line:
     """Add up the cells of one line."""
     asked = cells[0].parameters
     frames, right, wrong, tries = (

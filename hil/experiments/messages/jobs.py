@@ -93,7 +93,7 @@ def receive(parameters: Values, seed: int) -> dict[str, Scalar]:
     tracks = motion_capture_tracks(run_lockstep(settings), seed, MotionCapture())
     robot = seed % ROBOTS
     name = fleet.channels[robot].name
-    seen = _seen(tracks[robot], onset_s, end_s, job, draw)
+    seen = _observed_track(tracks[robot], onset_s, end_s, job, draw)
     error_s = float(draw.uniform(-_CLOCK_ERROR_S, _CLOCK_ERROR_S))
     found = _read(seen, keys[name], RecordedAt(unix_s + error_s, _CLOCK_ERROR_S))
     return {"received": payloads[name] in found, "wrong": any(payload != payloads[name] for payload in found)}
@@ -121,7 +121,7 @@ def _payload(framing: Framing, draw: np.random.Generator) -> Payload:
     return "".join(letters.tolist())
 
 
-def _seen(track: Track, onset_s: float, end_s: float, job: Job, draw: np.random.Generator) -> Track:
+def _observed_track(track: Track, onset_s: float, end_s: float, job: Job, draw: np.random.Generator) -> Track:
     """The recording from shortly before the message, with half of each repetition occluded where the job says so."""
     rows = (track.times_s >= onset_s - _LEAD_S + 0.1) & (track.times_s <= end_s)
     times_s, positions, valid = track.times_s[rows], track.positions[rows], track.valid[rows].copy()

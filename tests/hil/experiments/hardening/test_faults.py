@@ -19,7 +19,7 @@ from hil.experiments.hardening.faults import (
     assess,
     fault_cell,
     fault_cells,
-    line_of,
+    row_of,
 )
 from hil.experiments.runs.cells import Cell, CellStore
 from mtm_onboard.model.velocity import STOP, BodyVelocity
@@ -30,7 +30,7 @@ FINE = Outcome(0, 0.02, 0.2, 0.2, 0.27, 1, 8, 6, True, True, 1e-6)
 
 def measured(wire: str, fault: str, loss: str) -> Line:
     cell = Cell("faults", {"wire": wire, "fault": fault, "loss": loss}, 3)
-    return line_of(cell, fault_cell(cell.parameters, cell.seed))
+    return row_of(cell, fault_cell(cell.parameters, cell.seed))
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_a_window_that_the_robot_cannot_follow_was_not_sent():
 
 def judged(wire: str = "can", loss: str = "cut", **changes) -> Line:
     cell = Cell("faults", {"wire": wire, "fault": "none", "loss": loss}, 0)
-    return line_of(cell, vars(replace(FINE, **changes)))
+    return row_of(cell, vars(replace(FINE, **changes)))
 
 
 @pytest.mark.parametrize(
