@@ -1,4 +1,4 @@
-"""`mtm-hil demo`: the whole way of a message, from a fresh key to the auditor's verdicts."""
+"""`mtm-hil demo`: a message from a fresh key to the auditor's verdicts."""
 
 import json
 import os

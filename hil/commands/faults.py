@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.hardening.faults import Line, Outcome, fault_cell, fault_cells, row_of
+from hil.experiments.hardening.faults import Outcome, Row, fault_cell, fault_cells, row_of
 from hil.experiments.runs.cells import CellStore
 from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
@@ -34,7 +34,7 @@ def faults(seeds: int, seed: int, workers: int | None, out: Path | None, cells: 
     return wrong == 0
 
 
-def _sentence(line: Line) -> str:
+def _sentence(line: Row) -> str:
     one = line.outcome
     return (
         f"{line.wire}, {line.fault}, link {line.loss or 'kept'}: still {one.silent_stop_s:.2f} s after the last base "
@@ -45,7 +45,7 @@ def _sentence(line: Line) -> str:
     )
 
 
-def _loss(line: Line) -> str:
+def _loss(line: Row) -> str:
     if not line.loss:
         return ""
     if line.lost_deadline_s is None:
@@ -53,7 +53,7 @@ def _loss(line: Line) -> str:
     return f", {line.outcome.lost_stop_s:.2f} s after the loss ({line.lost_deadline_s:.2f} allowed)"
 
 
-def _row(line: Line) -> tuple[object, ...]:
+def _row(line: Row) -> tuple[object, ...]:
     deadline = "none" if line.lost_deadline_s is None else f"{line.lost_deadline_s:g}"
     numbers = [f"{value:.6g}" if isinstance(value, float) else value for value in astuple(line.outcome)]
     return (

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.messages.frames import Line, frame_cells, read_frames, row_of
+from hil.experiments.messages.frames import Row, frame_cells, read_frames, row_of
 from hil.experiments.runs.cells import CellStore
 from hil.experiments.runs.intervals import clopper_pearson
 from hil.experiments.runs.result_file import write_result_csv
@@ -30,7 +30,7 @@ def frames(count: int, seed: int, workers: int | None, out: Path | None, cells: 
         print(f"wrote {out}")
 
 
-def _sentence(line: Line) -> str:
+def _sentence(line: Row) -> str:
     at = f", distance {line.distance:g}" if line.distance else ""
     return (
         f"{line.what}, {line.check} of {line.check_bits} bits, code {line.code}{at}: of {line.frames} frames "
@@ -38,7 +38,7 @@ def _sentence(line: Line) -> str:
     )
 
 
-def _row(line: Line) -> tuple[object, ...]:
+def _row(line: Row) -> tuple[object, ...]:
     low, high = clopper_pearson(line.wrong, line.frames)
     return (
         line.what, line.code, line.check, line.check_bits, line.distance, line.frames, line.right, line.wrong,

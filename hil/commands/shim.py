@@ -13,7 +13,7 @@ from hil.vehicles.shim_library import load_shim
 
 def shim(rollouts: int, out: Path | None, cells: Path, console: Console) -> None:
     """Run, print and, where asked, write the comparison."""
-    load_shim()  # Where no compiler is, better to hear it before the work.
+    load_shim()  # Fails at once where there is no compiler.
     plant = calibrated_parameters()
     with CellStore(cells) as store:
         found = compare(rollouts, plant, store, console)

@@ -39,7 +39,7 @@ _SETTLING_S = 0.05
 
 @dataclass(frozen=True)
 class _Link:
-    """The wire to one robot: its transport, what its far end does each period, what it found wrong, and its end.
+    """The wire to one robot: our transport, the robot's periodic `poll`, the count of `faults`, and `shutdown`.
 
     `stop_releases_motors` says whether a stop over this wire switches the motors off as well.
     """
@@ -77,11 +77,11 @@ class _Robot:
 
 
 def run_lockstep(settings: RunSettings) -> RunResult:
-    """Run the world and return its motion.
+    """The motion of a run of the world.
 
     The same settings give the same result, bit for bit, over CAN and without a wire. In plaintext commands are rounded
-    to 0.1 mm/s and 0.001 deg/s; over MAVLink the first one waits until the vehicle was heard. Raises MtmError when a
-    robot's link fails.
+    to 0.1 mm/s and 0.001 deg/s; over MAVLink the first one waits for the vehicle's first message. Raises MtmError when
+    a robot's link fails.
     """
     clock = SimulatedClock()
     with ExitStack() as wires:
@@ -117,7 +117,7 @@ def _run(settings: RunSettings, clock: SimulatedClock, robots: list[_Robot]) -> 
 
 
 def _loop(settings: RunSettings, clock: SimulatedClock, step: Callable[[int, float], None]) -> LoopStats:
-    # A tick that falls on the very end would have no motion to show.
+    # A tick at the very end would have no motion after it.
     end_s = settings.seconds - 1e-6
     return run_loop(
         clock, settings.key.scheme.rate_hz, step, start_s=settings.onset_s, stop=lambda: clock.now() >= end_s

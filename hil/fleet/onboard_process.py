@@ -13,7 +13,7 @@ from mtm_onboard.model.velocity import STOP
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.journal_file import CLAMPED, REFUSED, STALE, JournalRecord, read_journal
 
-_PATIENCE_S = 5.0
+_TERMINATION_TIMEOUT_S = 5.0
 
 _CONFIG = """\
 [robot]
@@ -53,7 +53,7 @@ class OnboardProcess:
         )  # fmt: skip
         (folder / f"{name}.toml").write_text(config, encoding="utf-8")
         with (folder / f"{name}.log").open("wb") as log:
-            # In a session of its own a terminal's interrupt reaches it through `end` alone.
+            # In a session of its own, so that a terminal's interrupt reaches it only through `end`.
             self._process = subprocess.Popen(
                 [program("mtm-onboard"), "run", "--config", f"{name}.toml", *arguments],
                 cwd=folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True,
@@ -65,7 +65,7 @@ class OnboardProcess:
         return self._process.poll() is None
 
     def check(self, *, may_have_ended: bool) -> None:
-        """Raise MtmError when it has ended with an error, or at all although it may not have."""
+        """Raise MtmError when it has ended with an error, or has ended before it may."""
         code = self._process.poll()
         if code or (code == 0 and not may_have_ended):
             words = (self._folder / f"{self.name}.log").read_text(encoding="utf-8", errors="replace").strip()
@@ -76,13 +76,13 @@ class OnboardProcess:
         if self.is_running:
             self._process.terminate()
             try:
-                self._process.wait(_PATIENCE_S)
+                self._process.wait(_TERMINATION_TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 self._process.kill()
         self._process.wait()
 
     def report(self) -> RobotReport:
-        """What its journal and the robot's end of the wire tell, after it has ended.
+        """The robot's report from its journal and the robot's end of the wire, after the program has ended.
 
         Raises MtmError when the journal lacks rows or shows a tick that was sent twice.
         """

@@ -25,13 +25,13 @@ from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.runtime.client import BaseCommandClient
 from mtm_onboard.runtime.loop import run_loop
 
-# Four interpreters have to start before the message does.
+# Time for four interpreters to start before the message does.
 START_S = 4.0
 
 _POLLS_PER_COMMAND = 2
 _POLLS_PER_CHECK = 100
 _SHUTDOWN_TIMEOUT_S = 3.0
-# The programs' clock and this one's may differ by the steps of the system's time.
+# The programs' clock and this one may differ by adjustments of the system's time.
 _CLOCK_TOLERANCE_S = 0.5
 
 

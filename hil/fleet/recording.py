@@ -1,4 +1,4 @@
-"""What the sensors make of a run, and what belongs beside it: a folder that an auditor can be given.
+"""The recording of a run: a folder that an auditor can be given, and the truth beside it.
 
 mocap/<robot>.tum   motion capture
 video.mp4           the camera's film, unless none was wanted

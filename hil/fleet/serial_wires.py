@@ -1,4 +1,4 @@
-"""Simulated robots that a program in another process takes for real: behind pseudo-terminals and UDP ports."""
+"""Simulated robots behind pseudo-terminals and UDP ports, for programs in other processes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from mtm_onboard.links.mavlink_ports import UdpPort
 
 @dataclass(frozen=True)
 class SerialWire:
-    """One robot: the TOML fields of [transport] that reach it, what it does each period, and what it found wrong.
+    """One robot: the TOML fields of [transport] that reach it, its periodic `poll`, and the count of `faults`.
 
     `stop_releases_motors` says whether a stop over this wire switches the motors off as well.
     """

@@ -31,8 +31,8 @@ class MavlinkVehicle:
 
     It obeys set-points and requests that are addressed to it, the former only in its guided mode and armed, and counts
     in `ignored_setpoints` those that it ignores for their frame, mask or values. `signing_key` has it require
-    signatures. A vehicle that `goes_on` never stops for want of set-points, the worst that one could do. `can_arm`
-    False is a vehicle whose own checks fail. `pilot_switches` and `pilot_disarms` are the pilot's doing.
+    signatures. With `goes_on` it never stops when set-points end, the worst case. `can_arm`
+    False is a vehicle whose own checks fail. `pilot_switches` and `pilot_disarms` are the pilot's actions.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class MavlinkVehicle:
         self._engage()
 
     def say(self, severity: int, text: str) -> None:
-        """Send a text to whoever listens."""
+        """Send a status text."""
         self._send(self._codec.messages.MAVLink_statustext_message(severity, text.encode("ascii")))
 
     def _engage(self) -> None:

@@ -24,13 +24,13 @@ _BATTERY = "84 "
 class PlaintextMotionController:
     """Obeys text that arrives on `ports` and answers it; `poll` does everything that is due.
 
-    The first port that says `command` has the robot until it says `quit` or its client goes; everybody else meets
-    silence. SDK mode is the work mode of `controller`, which should have no deadman, as the robot has none: a speed
+    The first port that sends `command` owns the robot until it sends `quit` or its client disconnects; other ports get
+    no answer. SDK mode is the work mode of `controller`, which should have no deadman, as the robot has none: a speed
     holds until the next one or the end of SDK mode. While the gimbal leads, the chassis ignores turns.
 
     Obeyed are `command`, `quit`, `version`, `robot mode`, `robot battery ?`, and `chassis` with `speed`, `wheel`,
-    `push` and the queries; anything else fails. `obeyed` and `refused` count commands of the port that has the robot,
-    `ignored` those of the others, `dropped` those beyond what the robot queues. With `pushes_heading` pushed positions
+    `push` and the queries; anything else fails. `obeyed` and `refused` count commands of the owner,
+    `ignored` those of other ports, `dropped` those beyond what the robot queues. With `pushes_heading` pushed positions
     have the heading as a third number, as newer firmware sends, and otherwise two.
     """
 
@@ -62,7 +62,7 @@ class PlaintextMotionController:
 
     @property
     def is_taken(self) -> bool:
-        """Whether a port has the robot in SDK mode."""
+        """Whether a port owns the robot in SDK mode."""
         return self._owner is not None
 
     @property

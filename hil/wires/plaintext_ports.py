@@ -1,6 +1,6 @@
-"""The lines on which a simulated RoboMaster EP meets its client: one like a UART, and TCP with UDP beside it.
+"""The lines between a simulated RoboMaster EP and its client: one like a UART, and TCP with UDP beside it.
 
-Nothing here ever waits. What a client is too slow to read is lost, whole texts at a time.
+Nothing here waits. What a client does not read in time is lost, in whole texts.
 """
 
 import os

@@ -1,6 +1,6 @@
-"""A serial CAN adapter that is none: LAWICEL's ASCII protocol on a pseudo-terminal.
+"""A simulated serial CAN adapter: LAWICEL's ASCII protocol on a pseudo-terminal.
 
-A program in another process opens `path` as python-can's `slcan` interface and meets a simulated robot there. The
+A program in another process opens `path` as python-can's `slcan` interface and finds a simulated robot there. The
 protocol is that of the LAWICEL CANUSB manual: lines end in a carriage return, each is answered with a carriage
 return when done and with a bell when refused.
 """

@@ -20,11 +20,11 @@ Options = dict[str, Option]
 _CONNECT_WITHIN_S = 3.0
 # python-can's interfaces whose channel is a serial device.
 _SERIAL_CAN = ("slcan", "robotell", "seeedstudio")
-_UNREAL_CAN = ("virtual", "udp_multicast")
+_VIRTUAL_CAN = ("virtual", "udp_multicast")
 
 
 def check_link(kind: str, options: Options) -> Finding:
-    """What the transport's kind needs is there; the options are taken by making the transport, unopened."""
+    """Check what this kind of transport needs; the options are checked by making the transport without opening it."""
     try:
         make_transport(kind, options)
         return _CHECKS[kind](options)
@@ -35,7 +35,7 @@ def check_link(kind: str, options: Options) -> Finding:
 
 
 def check_serial(path: str) -> Finding:
-    """A serial device that this user may open and that no other program holds."""
+    """Check that this user may open the serial device and that no other program holds it."""
     if find_spec("serial") is None:
         return Finding("link", "fail", "pyserial is not installed; install mtm[serial] or python3-serial")
     try:
@@ -68,7 +68,7 @@ def _group(path: str) -> str:
 
 
 def check_tcp(host: str, port: int) -> Finding:
-    """Somebody takes a connection there; it is closed without a byte."""
+    """Check that the host accepts a connection, which is closed without sending a byte."""
     try:
         socket.create_connection((host, port), _CONNECT_WITHIN_S).close()
     except (OSError, OverflowError) as error:
@@ -81,7 +81,7 @@ def check_tcp(host: str, port: int) -> Finding:
 
 
 def check_udp_port(host: str, port: int) -> Finding:
-    """Nobody on this computer receives there yet."""
+    """Check that no program on this computer receives there."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind((host, port))
@@ -110,7 +110,7 @@ def _check_can(options: Options) -> Finding:
     if interface in _SERIAL_CAN:
         # python-can takes the serial line's own rate after an @.
         return check_serial(channel.partition("@")[0])
-    if interface in _UNREAL_CAN:
+    if interface in _VIRTUAL_CAN:
         return Finding("link", "pass", f"the CAN interface {interface} needs no adapter")
     named = interface or "that python-can's own configuration names"
     return Finding(

@@ -40,7 +40,7 @@ class Condition:
 
 @dataclass(frozen=True)
 class Row:
-    """What one detector had right in one job; a message is all that the robots of a rollout send."""
+    """One detector's correct symbols and messages in one job; a message is all that the robots of a rollout send."""
 
     job: Job
     detector: str
@@ -50,7 +50,7 @@ class Row:
 
 
 def conditions(rollouts: int) -> list[Condition]:
-    """All of them, the most telling first; the paper's detector reads a tenth of what would take it long."""
+    """All conditions, the most informative first; the paper's detector reads a tenth of the slow ones."""
     tenth = -(-rollouts // 10)
     over_ticks = [Condition(replace(_PAPER, window_ticks=ticks), rollouts, rollouts) for ticks in _TICKS]
     return [
@@ -65,7 +65,7 @@ def conditions(rollouts: int) -> list[Condition]:
 
 
 def quick_conditions() -> list[Condition]:
-    """A few of each kind, in seconds."""
+    """A few conditions of each kind, which take seconds."""
     jobs = (_PAPER, replace(_PAPER, window_ticks=300), replace(_PAPER, sigma=0.04), Job(16, 50, 4, PAPER_SIGMA))
     return [Condition(job, _QUICK_ROLLOUTS, _QUICK_ROLLOUTS) for job in jobs]
 

@@ -21,7 +21,7 @@ _LABELS = {COHERENCY: "coherency (the paper's)", MATCHED: "matched (blind)", GEN
 
 
 def rich_table(rows: Sequence[Row]) -> Table:
-    """One line a job and detector; percent with exact 95 % intervals."""
+    """One row for each job and detector; percent with exact 95 % intervals."""
     table = Table(
         title="RoboMaster, four robots; percent with exact 95 % intervals", box=None, padding=(0, 1, 0, 0),
         pad_edge=False,
@@ -42,7 +42,7 @@ def rich_table(rows: Sequence[Row]) -> Table:
 def write_csv(path: Path, rows: Sequence[Row], command: str, notes: Sequence[str]) -> None:
     """Write the rows under the command line and the notes."""
     shares = [f"{share}{end}" for share in ("symbol", "message") for end in ("s", "s_correct", *_ends("_percent"))]
-    write_result_csv(path, command, (*_COLUMNS, *shares), (_csv_cells(row) for row in _ordered(rows)), notes)
+    write_result_csv(path, command, (*_COLUMNS, *shares), (_csv_row(row) for row in _ordered(rows)), notes)
 
 
 def draw_plot(path: Path, rows: Sequence[Row]) -> None:
@@ -90,13 +90,13 @@ def _ends(name: str) -> tuple[str, str, str]:
     return name, f"{name}_low", f"{name}_high"
 
 
-def _csv_cells(row: Row) -> tuple[object, ...]:
+def _csv_row(row: Row) -> tuple[object, ...]:
     job = row.job
     given = (job.alphabet_size, job.window_ticks, job.windows, job.sigma, row.detector, row.rollouts)
-    return (*given, *_share_cells(row.symbols), *_share_cells(row.messages))
+    return (*given, *_share_fields(row.symbols), *_share_fields(row.messages))
 
 
-def _share_cells(share: Proportion) -> tuple[object, ...]:
+def _share_fields(share: Proportion) -> tuple[object, ...]:
     return share.trials, share.successes, *(f"{value:.2f}" for value in (share.percent, *share.interval_percent))
 
 

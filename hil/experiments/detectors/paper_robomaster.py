@@ -1,4 +1,4 @@
-"""The paper's RoboMaster table and its null conditions, measured on the simulated fleet."""
+"""The paper's RoboMaster table and its null conditions (tab:robomaster-indep, tab:null), on the simulated fleet."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ def measure(
     conditions: Sequence[tuple[str, int]] | None = None,
     workers: int | None = None,
 ) -> list[Row]:
-    """Measure all rows, or those of the given (arm, T); seeds count from 0."""
+    """All rows, or those of the given (arm, T), measured; seeds count from 0."""
     asked = _all_conditions() if conditions is None else conditions
     groups = [[_cell(plant, arm, ticks, seed) for seed in range(rollouts)] for arm, ticks in asked]
     results = run_sweep(decode_rollout, [cell for group in groups for cell in group], store, console, workers)
@@ -101,10 +101,10 @@ def write_csv(path: Path, rows: Sequence[Row], command: str, notes: Sequence[str
              "symbol_percent_high", "paper_symbol_percent", "messages_correct", "message_percent",
              "message_percent_low", "message_percent_high", "paper_message_percent", "margin",
              "margin_standard_error", "paper_margin")  # fmt: skip
-    write_result_csv(path, command, columns, (_csv_cells(row) for row in rows), notes)
+    write_result_csv(path, command, columns, (_csv_row(row) for row in rows), notes)
 
 
-def _csv_cells(row: Row) -> tuple[object, ...]:
+def _csv_row(row: Row) -> tuple[object, ...]:
     low, high = row.symbols.interval_percent
     messages: tuple[object, ...] = ("", "", "", "")
     if row.messages is not None:

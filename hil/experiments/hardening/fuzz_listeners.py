@@ -1,4 +1,4 @@
-"""Both ends of every wire, telling of each message that passed whatever check its format has."""
+"""Both ends of every wire, which report each message that passed the checks of its format."""
 
 from collections.abc import Callable
 from typing import Any
@@ -23,24 +23,24 @@ from mtm_onboard.links.mavlink_profiles import PROFILES, Profile
 from mtm_onboard.links.mavlink_state import VehicleState
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 
-# Takes a message as the bytes that it came in.
+# Called with the bytes of an accepted message.
 OnMessage = Callable[[bytes], None]
 
 
 class FedPort(Port):
-    """A line on which `waiting` arrives; nobody listens at its other end."""
+    """A line on which `waiting` arrives and whose other end discards everything."""
 
     def __init__(self) -> None:
         self.waiting = bytearray()
 
     def receive(self) -> bytes | None:
-        """What waits."""
+        """The bytes that wait."""
         data = bytes(self.waiting)
         self.waiting.clear()
         return data
 
     def answer(self, text: bytes) -> None:
-        """Nobody listens."""
+        """Discard it."""
 
     push = answer
 
@@ -83,7 +83,7 @@ class CanLinkListener(RoboMasterCan):
 
 
 class PlaintextNodeListener(PlaintextMotionController):
-    """The plaintext robot, which tells of what it obeys."""
+    """The robot on the plaintext line; reports the commands that it obeys."""
 
     def __init__(self, controller: MotionController, port: Port, on_message: OnMessage) -> None:
         super().__init__(controller, [port])
@@ -97,7 +97,7 @@ class PlaintextNodeListener(PlaintextMotionController):
 
 
 class PlaintextLinkListener(LineTransport):
-    """The plaintext transport, which tells of what it does not call malformed."""
+    """Our end of the plaintext line; reports the texts that are not malformed."""
 
     def __init__(self, link: ByteLink, on_message: OnMessage) -> None:
         super().__init__(link)
@@ -137,13 +137,13 @@ class _VehicleStateListener(VehicleState):
         self._on_message = on_message
 
     def take(self, message: Any, now_s: float) -> bool:
-        """Tell of it, then read it."""
+        """Report the message, then take it."""
         self._on_message(bytes(message.get_msgbuf()))
         return super().take(message, now_s)
 
 
 def as_text(text: str) -> bytes:
-    """What was read as text, with a question mark for each byte that is none."""
+    """The text as ASCII, with a question mark for every other character."""
     return text.encode("ascii", "replace")
 
 

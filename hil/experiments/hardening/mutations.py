@@ -1,4 +1,4 @@
-"""Damage to valid traffic: what a bad cable, a full buffer or somebody's curiosity makes of it."""
+"""Mutations of valid traffic, as a bad cable, a full buffer or an experimenting client produce them."""
 
 import random
 from collections.abc import Callable
@@ -8,7 +8,7 @@ _MAX_MESSAGES = 3
 _MAX_DAMAGES = 3
 _MAX_BITS = 8
 _MAX_INSERTED = 40
-# A length or a count is rarely wrong by chance in a way that matters.
+# Lengths and counts near a boundary, which random bytes rarely hit.
 _BOUNDARY_VALUES = (0, 1, 12, 13, 127, 128, 254, 255)
 
 
@@ -16,8 +16,8 @@ _BOUNDARY_VALUES = (0, 1, 12, 13, 127, 128, 254, 255)
 class Traffic:
     """Valid messages of one direction of a wire.
 
-    `starts` are the bytes that begin a message, `lengths_at` where in it its length stands. `seal` makes a message
-    with another content and right checksums out of a valid one, None where there is no checksum.
+    `starts` are the bytes that begin a message, `lengths_at` the offsets of its length. `seal` makes, from a valid
+    message, one with other content and correct checksums; None where the format has no checksum.
     """
 
     messages: tuple[bytes, ...]
@@ -27,7 +27,7 @@ class Traffic:
 
 
 def damaged(draw: random.Random, traffic: Traffic) -> tuple[bytes, list[bytes]]:
-    """A few messages with up to three kinds of damage, and those of them that were sealed anew before that."""
+    """One to three messages with up to three kinds of damage, and those among them that `seal` made before that."""
     messages = draw.choices(traffic.messages, k=draw.randint(1, _MAX_MESSAGES))
     sealed: list[bytes] = []
     if traffic.seal is not None and draw.random() < 0.2:
@@ -69,7 +69,7 @@ def _duplicate(draw: random.Random, data: bytearray, _traffic: Traffic) -> None:
 
 
 def _swap(draw: random.Random, data: bytearray, _traffic: Traffic) -> None:
-    """Two neighbouring frames of eight bytes arrive the other way round."""
+    """Exchange two neighbouring frames of eight bytes."""
     begin = 8 * draw.randrange((len(data) + 7) // 8)
     data[begin : begin + 16] = data[begin + 8 : begin + 16] + data[begin : begin + 8]
 
@@ -86,7 +86,7 @@ def _insert(draw: random.Random, data: bytearray, traffic: Traffic) -> None:
 
 def _change_length(draw: random.Random, data: bytearray, traffic: Traffic) -> None:
     if not traffic.lengths_at:
-        # Text has numbers instead.
+        # Text has no lengths; change a digit.
         digits = [place for place, letter in enumerate(data) if 48 <= letter < 58]
         if digits:
             data[draw.choice(digits)] = draw.choice(b"0123456789.-exX ")

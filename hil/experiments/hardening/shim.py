@@ -1,4 +1,4 @@
-"""The paper's job with the noise played by the microcontroller's C code, beside the same rollouts from Python."""
+"""The paper's RoboMaster message played by the microcontroller's C code, beside the same rollouts played by Python."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -23,10 +23,10 @@ JOB = Job(4, 150, 1, PAPER_SIGMA)
 
 @dataclass(frozen=True)
 class Comparison:
-    """Whole messages that came through from each; `same`: rollouts decoded to the same four symbols either way.
+    """Share of messages decoded from each; `same`: rollouts decoded to the same four symbols from both.
 
-    `apart_m` is the farthest that a robot was from where it was in the other run, in half of the rollouts and in all;
-    rounding alone moves it little, but now and then a robot reaches a waypoint a tick earlier.
+    `apart_m`: greatest distance (median over rollouts, and maximum) between a robot's positions in the two runs.
+    Rounding alone moves it little, but sometimes a robot reaches a waypoint one tick earlier.
     """
 
     python: Proportion
@@ -38,14 +38,14 @@ class Comparison:
 def compare(
     rollouts: int, plant: MecanumParameters, store: CellStore, console: Console, workers: int | None = None
 ) -> Comparison:
-    """Run every rollout twice. Raises MtmError without a C compiler or cffi."""
+    """The comparison over rollouts that are each run twice. Raises MtmError without a C compiler or cffi."""
     parameters = {**asdict(JOB), **asdict(plant)}
     cells = [Cell("shim", parameters, FIRST_SEED + number) for number in range(rollouts)]
     return _comparison(run_sweep(read_both, cells, store, console, workers))
 
 
 def read_both(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """One rollout with either modulator, decoded by the matched detector."""
+    """One rollout run with each of both modulators and decoded by the matched detector."""
     job, plant = job_of(parameters), plant_of(parameters)
     python, shim = record(job, plant, seed), record(job, plant, seed, ShimModulator)
     decided = {PYTHON: read_matched(job, python), SHIM: read_matched(job, shim)}

@@ -1,4 +1,7 @@
-"""Cells of a sweep, and the file that keeps what they gave."""
+"""Cells, the units of work of every experiment, and the file that keeps their results.
+
+In `hil` the word cell has this meaning only.
+"""
 
 import json
 import os
@@ -17,7 +20,7 @@ Values = Mapping[str, Scalar]
 
 @dataclass(frozen=True)
 class Cell:
-    """One piece of work: its result is a function of these three and of the code."""
+    """One unit of work: its result is a function of these three and of the code."""
 
     experiment: str
     parameters: Values
@@ -25,7 +28,7 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """The same text for the same cell, whatever the order of its parameters."""
+        """A text that is the same for equal cells, whatever the order of their parameters."""
         return json.dumps([self.experiment, self.parameters, self.seed], sort_keys=True)
 
 
@@ -60,7 +63,7 @@ class CellStore:
         return self._finished.get(cell.name)
 
     def add(self, cell: Cell, result: Values) -> None:
-        """Keep a result for good."""
+        """Store a result and flush it to the disk."""
         entry = {"code": self._code, "cell": cell.name, "result": dict(result)}
         self._file.write(json.dumps(entry).encode() + b"\n")
         os.fsync(self._file.fileno())

@@ -14,8 +14,8 @@ from hil.experiments.hardening.faults import (
     FAULTS,
     LOSSES,
     WIRES,
-    Line,
     Outcome,
+    Row,
     assess,
     fault_cell,
     fault_cells,
@@ -28,7 +28,7 @@ from mtm_onboard.protocol.journal_file import NOISE, UNSENT, JournalHeader, Jour
 FINE = Outcome(0, 0.02, 0.2, 0.2, 0.27, 1, 8, 6, True, True, 1e-6)
 
 
-def measured(wire: str, fault: str, loss: str) -> Line:
+def measured(wire: str, fault: str, loss: str) -> Row:
     cell = Cell("faults", {"wire": wire, "fault": fault, "loss": loss}, 3)
     return row_of(cell, fault_cell(cell.parameters, cell.seed))
 
@@ -107,7 +107,7 @@ def test_a_window_that_the_robot_cannot_follow_was_not_sent():
     assert (result["windows"], result["sent"], result["message_is_due"]) == (8, 4, True)
 
 
-def judged(wire: str = "can", loss: str = "cut", **changes) -> Line:
+def judged(wire: str = "can", loss: str = "cut", **changes) -> Row:
     cell = Cell("faults", {"wire": wire, "fault": "none", "loss": loss}, 0)
     return row_of(cell, vars(replace(FINE, **changes)))
 
