@@ -13,6 +13,7 @@ from hil.commands.options import (
     NewFolder,
     NoMessage,
     Renderer,
+    RendererName,
     WorldSeed,
     reported_console,
     require_message_or_none,
@@ -81,9 +82,7 @@ def film(
     seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Length of the film.")] = 30.0,
     key: KeyFile = None,
     seed: WorldSeed = 0,
-    renderer: Annotated[Renderer, typer.Option(help="Who draws: the software camera or the simulator.")] = (
-        Renderer.SOFTWARE
-    ),
+    renderer: RendererName = Renderer.SOFTWARE,
 ) -> None:
     """Film one of the paper's simulated worlds while it sends a message on all its channels."""
     require_message_or_none(message, no_message)

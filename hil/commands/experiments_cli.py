@@ -22,13 +22,15 @@ def calibrate(
 
 
 def bench(
-    rollouts: Annotated[int, typer.Option(min=1, help="Rollouts of the main lines; the slow ones take a part.")] = 200,
-    quick: Annotated[bool, typer.Option("--quick", help="A few rollouts of a few lines, for a first look.")] = False,
+    rollouts: Annotated[int, typer.Option(min=1, help="Rollouts of the main conditions; slow ones take fewer.")] = 200,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A few rollouts of some conditions, for a first look.")
+    ] = False,
     out: OutCsv = None,
     plot: Annotated[Path | None, typer.Option(help="A picture to draw: accuracy over the window length.")] = None,
     cells: Cells = CELLS_FOLDER / "bench.jsonl",
 ) -> None:
-    """Compare the detectors, the paper's and ours, with the limit, on the same recordings."""
+    """Compare the paper's detector and ours with the genie, an oracle, on the same recordings."""
     with reported_console() as console:
         from hil.commands.bench import BenchOptions
         from hil.commands.bench import bench as run
@@ -44,7 +46,7 @@ def false_alarms(
     out: OutCsv = None,
     cells: Cells = CELLS_FOLDER / "false-alarms.jsonl",
 ) -> None:
-    """Decode recordings that hold nothing under the key asked, and see how the p-values are spread."""
+    """Decode recordings without a message under the given key, and compare the p-values with a uniform law."""
     with reported_console() as console:
         from hil.commands.false_alarms import false_alarms as run
 
@@ -58,7 +60,7 @@ def messages(
     out: OutCsv = None,
     cells: Cells = CELLS_FOLDER / "messages.jsonl",
 ) -> None:
-    """Send framed messages and see how many are received, whole, by the clock, and through occlusions."""
+    """Count how many framed messages are received: whole, with a known time, and through occlusions."""
     with reported_console() as console:
         from hil.commands.messages import messages as run
 
@@ -98,7 +100,7 @@ def robustness(
     out: OutCsv = None,
     cells: Cells = CELLS_FOLDER / "robustness.jsonl",
 ) -> None:
-    """Read the same rollouts through cameras, frames and clocks that nobody calibrated."""
+    """Decode the same rollouts under uncalibrated cameras, frame times and clocks."""
     with reported_console() as console:
         from hil.commands.robustness import robustness as run
 
@@ -150,7 +152,7 @@ def sweep(
 
 
 def faults(
-    seeds: Annotated[int, typer.Option("-n", min=1, help="Runs of each cell of the matrix.")] = 3,
+    seeds: Annotated[int, typer.Option("-n", min=1, help="Runs of each combination of wire, fault and loss.")] = 3,
     seed: Annotated[int, typer.Option(min=0, help="The first run's seed.")] = 0,
     workers: Workers = None,
     out: OutCsv = None,
@@ -171,7 +173,7 @@ def fuzz(
     out: OutCsv = None,
     cells: Cells = CELLS_FOLDER / "fuzz.jsonl",
 ) -> None:
-    """Feed damaged traffic to the transports and the simulated robots, and see what they take for sound."""
+    """Feed damaged traffic to both ends of every wire, and count the messages that they accept."""
     with reported_console() as console:
         from hil.commands.fuzz import fuzz as run
 
@@ -181,7 +183,7 @@ def fuzz(
 
 def endurance(
     hours: Annotated[float, typer.Option(min=0.0, help="Simulated hours.")] = 24.0,
-    checkpoints: Annotated[int, typer.Option(min=1, help="How often to look, evenly spaced and at the end.")] = 24,
+    checkpoints: Annotated[int, typer.Option(min=1, help="Number of checkpoints, evenly spaced up to the end.")] = 24,
     seed: Annotated[int, typer.Option(min=0, help="Decides where the robot goes and how its wheels slip.")] = 0,
     out: OutCsv = None,
 ) -> None:

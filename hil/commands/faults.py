@@ -18,7 +18,7 @@ _COLUMNS = (
 
 
 def faults(seeds: int, seed: int, workers: int | None, out: Path | None, cells: Path, console: Console) -> bool:
-    """Measure, print and, where asked, write the matrix; False when some cell is not as it should be."""
+    """Measure, print and, where asked, write the matrix; False when a run fails a requirement."""
     asked = fault_cells(seeds, seed)
     with CellStore(cells) as store:
         results = run_sweep(fault_cell, asked, store, console, workers)
@@ -26,7 +26,7 @@ def faults(seeds: int, seed: int, workers: int | None, out: Path | None, cells: 
     for line in lines:
         print(_sentence(line))
     wrong = sum(not (line.stops and line.is_fresh and line.is_read) for line in lines)
-    print(f"{len(lines)} runs, {wrong} of them not as they should be")
+    print(f"{len(lines)} runs, {wrong} of them failed")
     if out is not None:
         command = f"mtm-hil faults -n {seeds} --seed {seed} --out {out}"
         write_result_csv(out, command, _COLUMNS, map(_row, lines))
@@ -37,11 +37,11 @@ def faults(seeds: int, seed: int, workers: int | None, out: Path | None, cells: 
 def _sentence(line: Row) -> str:
     one = line.outcome
     return (
-        f"{line.wire}, {line.fault}, link {line.loss or 'kept'}: still {one.silent_stop_s:.2f} s after the last base "
-        f"command ({line.silent_deadline_s:.2f} allowed){_loss(line)}; commands {one.arrived_s:.2f} s old on arrival, "
-        f"in force until {one.held_s:.2f} s, {one.altered} altered; {one.sent} of {one.windows} windows sent, "
-        f"message {'read' if one.is_decoded else 'not read'}"
-        f"{'' if line.stops and line.is_fresh and line.is_read else ' - NOT AS IT SHOULD BE'}"
+        f"{line.wire}, {line.fault}, link {line.loss or 'kept'}: stopped {one.silent_stop_s:.2f} s after the last base "
+        f"command ({line.silent_deadline_s:.2f} allowed){_loss(line)}; commands at most {one.arrived_s:.2f} s old "
+        f"on arrival and {one.held_s:.2f} s in force, {one.altered} altered; {one.sent} of {one.windows} windows sent, "
+        f"message {'decoded' if one.is_decoded else 'not decoded'}"
+        f"{'' if line.stops and line.is_fresh and line.is_read else ' - FAILED'}"
     )
 
 

@@ -62,7 +62,7 @@ def film(options: FilmOptions, console: Console) -> None:
             count = write_video(frames, folder / "video.mp4", world.rate_hz)
         truth = {"world": options.world, "message": options.message, "scheme_fingerprint": key.scheme.fingerprint}
         (folder / "truth.json").write_text(json.dumps(truth | {"seed": options.seed}, indent=2) + "\n")
-    sent = "no message" if options.message is None else f"message {options.message} from the start, again and again"
+    sent = "no message" if options.message is None else f"message {options.message} repeated from the start"
     print(f"{options.out}: {count} frames, {sent}")
     print(f"decode it with --tracker {TRACKERS[options.world]}")
     if options.key is None:

@@ -14,7 +14,7 @@ _COLUMNS = ("target", *COUNTS, "most_altered_expected", "longest_ms")
 
 
 def fuzz(inputs: int, seed: int, workers: int | None, out: Path | None, cells: Path, console: Console) -> bool:
-    """Fuzz, print and, where asked, write what came of it; False when something crashed, was deaf or made things up."""
+    """Fuzz, print and, where asked, write what came of it; False after a crash, no response or a made-up message."""
     asked = fuzz_cells(inputs, seed)
     with CellStore(cells) as store:
         results = run_sweep(fuzz_cell, asked, store, console, workers)
@@ -32,16 +32,16 @@ def fuzz(inputs: int, seed: int, workers: int | None, out: Path | None, cells: P
         command = f"mtm-hil fuzz -n {inputs} --seed {seed} --out {out}"
         write_result_csv(out, command, _COLUMNS, map(_row, summaries))
         print(f"wrote {out}")
-    return not any(one.counts[name] for one in summaries for name in ("unsent", "crashes", "deaf"))
+    return not any(one.counts[name] for one in summaries for name in ("unsent", "crashes", "unresponsive"))
 
 
 def _sentence(one: Summary) -> str:
     expected = "text has no checksum" if one.most_altered is None else f"at most {one.most_altered:.2g} expected"
     counts = one.counts
     return (
-        f"{one.target}: {counts['inputs']} inputs, {counts['crashes']} crashes, deaf after {counts['deaf']}, "
-        f"{counts['whole']} whole messages understood, {counts['altered']} altered ({expected}), {counts['unsent']} "
-        f"that never came; at most {one.longest_ms:.1f} ms an input"
+        f"{one.target}: {counts['inputs']} inputs, {counts['crashes']} crashes, {counts['unresponsive']} times no "
+        f"response, {counts['whole']} whole messages accepted, {counts['altered']} altered ({expected}), "
+        f"{counts['unsent']} never sent; at most {one.longest_ms:.1f} ms an input"
     )
 
 

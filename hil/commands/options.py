@@ -29,11 +29,12 @@ KeyFile = Annotated[Path | None, typer.Option(help="The key file; one is made in
 WorldSeed = Annotated[int, typer.Option(min=0, help="Decides everything random but the message's waveforms.")]
 
 # An experiment.
+RendererName = Annotated[Renderer, typer.Option(help="Who draws the pictures: the software camera or the simulator.")]
 FirstSeed = Annotated[int, typer.Option(min=0, help="The first rollout's seed.")]
 CellSeed = Annotated[int, typer.Option(min=0, help="The first cell's seed.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")]
 OutCsv = Annotated[Path | None, typer.Option(help="A CSV file to write as well.")]
-Cells = Annotated[Path, typer.Option(help="Finished rollouts; a run that was interrupted goes on from there.")]
+Cells = Annotated[Path, typer.Option(help="File of finished rollouts, with which an interrupted run goes on.")]
 # Where each keeps its finished cells unless told otherwise.
 CELLS_FOLDER = Path("out/cells")
 

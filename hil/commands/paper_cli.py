@@ -5,7 +5,16 @@ from typing import Annotated
 
 import typer
 
-from hil.commands.options import CELLS_FOLDER, Cells, FirstSeed, OutCsv, Renderer, Workers, reported_console
+from hil.commands.options import (
+    CELLS_FOLDER,
+    Cells,
+    FirstSeed,
+    OutCsv,
+    Renderer,
+    RendererName,
+    Workers,
+    reported_console,
+)
 
 paper = typer.Typer(help="The paper's tables, measured on the simulated robots.", no_args_is_help=True)
 
@@ -29,7 +38,6 @@ _Rollouts = Annotated[
     typer.Option("-n", min=1, help="Rollouts at the headline's scheme, Football 64 for each ten; others take a part."),
 ]
 _Quick = Annotated[bool, typer.Option("--quick", help="One rollout of a few points, for a first look.")]
-_Renderer = Annotated[Renderer, typer.Option(help="Who draws the pictures: the software camera or the simulator.")]
 
 
 def _paper_worlds(
@@ -37,7 +45,7 @@ def _paper_worlds(
     rollouts: _Rollouts = 50,
     quick: _Quick = False,
     seed: FirstSeed = 10_000,
-    renderer: _Renderer = Renderer.SOFTWARE,
+    renderer: RendererName = Renderer.SOFTWARE,
     workers: Workers = None,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well; a folder for all.")] = None,
     cells: Cells = CELLS_FOLDER / "worlds.jsonl",

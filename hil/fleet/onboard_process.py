@@ -69,7 +69,7 @@ class OnboardProcess:
         code = self._process.poll()
         if code or (code == 0 and not may_have_ended):
             words = (self._folder / f"{self.name}.log").read_text(encoding="utf-8", errors="replace").strip()
-            raise MtmError(f"mtm-onboard of {self.name} ended with code {code} ({words[-300:] or 'it said nothing'})")
+            raise MtmError(f"mtm-onboard of {self.name} ended with code {code} ({words[-300:] or 'no output'})")
 
     def end(self) -> None:
         """Ask it to stop the robot and end, and end it when it does not."""

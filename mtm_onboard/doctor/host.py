@@ -42,7 +42,7 @@ def check_clock(schedule: str, synchronised: bool | None) -> Finding:
     """Check the time of day: a rolling schedule needs it, a fixed one only to start robots together."""
     if synchronised:
         return Finding("clock", "pass", "the system's clock is synchronised")
-    found = "nobody says that it is" if synchronised is None else "it is not"
+    found = "the system does not report that it is" if synchronised is None else "it is not"
     remedy = "install chrony (with rtcsync in its configuration) or enable systemd-timesyncd"
     if schedule == "rolling":
         return Finding(

@@ -31,7 +31,7 @@ def check_link(kind: str, options: Options) -> Finding:
     except MtmError as error:
         return Finding("link", "fail", str(error))
     except (OSError, ValueError, TypeError, LookupError) as error:
-        return Finding("link", "fail", f"these options reach no robot ({error}); correct [transport]")
+        return Finding("link", "fail", f"these options cannot be used ({error}); correct [transport]")
 
 
 def check_serial(path: str) -> Finding:
@@ -44,10 +44,10 @@ def check_serial(path: str) -> Finding:
         return Finding("link", "fail", f"{path} cannot be opened ({error.strerror}); {_serial_remedy(path, error)}")
     try:
         if not os.isatty(descriptor):
-            return Finding("link", "fail", f"{path} is no serial line; correct it in [transport]")
+            return Finding("link", "fail", f"{path} is not a serial line; correct it in [transport]")
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
-        return Finding("link", "fail", f"another program has {path}; end it")
+        return Finding("link", "fail", f"another program holds {path}; end it")
     finally:
         os.close(descriptor)
     return Finding("link", "pass", f"{path} can be opened")
@@ -74,7 +74,7 @@ def check_tcp(host: str, port: int) -> Finding:
     except (OSError, OverflowError) as error:
         return Finding(
             "link", "fail",
-            f"nobody answers at {host} port {port} ({error}); switch the robot on and join its network, then try "
+            f"nothing answers at {host} port {port} ({error}); switch the robot on and join its network, then try "
             f"ping {host}",
         )  # fmt: skip
     return Finding("link", "pass", f"{host} port {port} takes connections")
@@ -87,7 +87,7 @@ def check_udp_port(host: str, port: int) -> Finding:
             probe.bind((host, port))
         except (OSError, OverflowError) as error:
             return Finding(
-                "link", "fail", f"UDP port {port} cannot be had ({error}); end the program that listens there"
+                "link", "fail", f"UDP port {port} cannot be opened ({error}); end the program that listens there"
             )
     return Finding("link", "pass", f"UDP port {port} is free for what the robot sends")
 
@@ -148,7 +148,7 @@ def _check_mavlink(options: Options) -> Finding:
     except OSError as error:
         return Finding("link", "fail", f"the host {host} is not known ({error}); give its IP address")
     return Finding(
-        "link", "pass", f"messages go to {address} UDP port {number}; whether a vehicle hears them is unseen"
+        "link", "pass", f"messages go to {address} UDP port {number}; whether a vehicle receives them is not checked"
     )
 
 

@@ -23,7 +23,7 @@ class ActionBounds:
     def clip(self, actions: Floats) -> Floats:
         """`actions`, (axes,) or (envs, axes), clipped to the bounds; raises MtmError when one is not finite."""
         if not np.all(np.isfinite(actions)):
-            raise MtmError("an action is not finite, so it goes nowhere; look for what the policy was fed")
+            raise MtmError("an action is not finite and is not applied; check the inputs of the policy")
         within: Floats = np.clip(actions, self._low, self._high)
         cut = np.any(within != actions, axis=-1)
         self.actions += cut.size

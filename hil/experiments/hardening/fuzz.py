@@ -53,7 +53,7 @@ def fuzz_cell(parameters: Values, seed: int) -> dict[str, Scalar]:
     return {**{name: total[name] for name in COUNTS}, "longest_ms": round(1e3 * longest_s, 3), "failure": failure}
 
 
-COUNTS = ("inputs", "bytes", "whole", "altered", "unsent", "failed_checks", "crashes", "deaf")
+COUNTS = ("inputs", "bytes", "whole", "altered", "unsent", "failed_checks", "crashes", "unresponsive")
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class _Session:
             probe = target.probe_message()
             target.made.add(probe)
             self._feed(probe)
-            self.counts["deaf"] += probe not in target.accepted[before:]
+            self.counts["unresponsive"] += probe not in target.accepted[before:]
         except Exception:
             self.counts["crashes"] += 1
             self.failure = traceback.format_exc()

@@ -141,7 +141,7 @@ def test_the_table_comes_from_the_finished_cells_and_a_bad_one_is_told(tmp_path,
             bad = cell.parameters == {"wire": "can", "fault": "drop", "loss": ""}
             store.add(cell, vars(replace(FINE, silent_stop_s=0.5 if bad else 0.27)))
     assert not faults(1, 0, 1, out, cells, Console())
-    assert "81 runs, 1 of them not as they should be" in capsys.readouterr().out
+    assert "81 runs, 1 of them failed" in capsys.readouterr().out
     with out.open() as file:
         assert next(file).startswith("# mtm-hil faults -n 1 --seed 0 --out ")
         assert next(file).startswith("# code ")
