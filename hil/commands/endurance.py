@@ -1,4 +1,4 @@
-"""`mtm-hil endurance`: what a long run uses up, and whether its message is still there at the end."""
+"""`mtm-hil endurance`: the resources that a long run consumes, and whether its message can still be decoded."""
 
 from dataclasses import astuple, fields
 from pathlib import Path

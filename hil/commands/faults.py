@@ -1,4 +1,4 @@
-"""`mtm-hil faults`: what a robot does when its wire goes wrong."""
+"""`mtm-hil faults`: a robot under faults of its wire."""
 
 from dataclasses import astuple, fields
 from pathlib import Path

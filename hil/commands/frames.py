@@ -1,4 +1,4 @@
-"""`mtm-hil frames`: what framed messages withstand, on simulated log-likelihood ratios."""
+"""`mtm-hil frames`: framed messages under noise and attack, on simulated log-likelihood ratios."""
 
 from pathlib import Path
 

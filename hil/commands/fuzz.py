@@ -14,7 +14,7 @@ _COLUMNS = ("target", *COUNTS, "most_altered_expected", "longest_ms")
 
 
 def fuzz(inputs: int, seed: int, workers: int | None, out: Path | None, cells: Path, console: Console) -> bool:
-    """Fuzz, print and, where asked, write what came of it; False after a crash, no response or a made-up message."""
+    """Fuzz, print and, where asked, write the counts; False after a crash, no response or a made-up message."""
     asked = fuzz_cells(inputs, seed)
     with CellStore(cells) as store:
         results = run_sweep(fuzz_cell, asked, store, console, workers)

@@ -47,7 +47,7 @@ def require_message_or_none(message: int | None, no_message: bool) -> None:
 
 @contextmanager
 def reported_console() -> Iterator["Console"]:
-    """A console for a command whose errors are told in one sentence, with the exit code they have."""
+    """Yield a console; an error in the block is printed in one sentence and ends the program with its exit code."""
     from rich.console import Console
 
     with reported("mtm-hil", "no half-written result is left"):

@@ -1,4 +1,4 @@
-"""`mtm-hil robustness`: the matched detector under views, frames and clocks that nobody calibrated."""
+"""`mtm-hil robustness`: the matched detector under uncalibrated cameras, frame times and clocks."""
 
 from dataclasses import asdict
 from pathlib import Path

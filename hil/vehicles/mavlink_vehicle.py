@@ -1,4 +1,4 @@
-"""The vehicle's end of a MAVLink wire: an autopilot that obeys what a real one obeys, and ignores the rest."""
+"""The vehicle's end of a MAVLink wire: an autopilot that obeys and ignores the same messages as a real one."""
 
 import math
 from collections.abc import Callable

@@ -1,5 +1,7 @@
 """VMAS's Discovery with one agent: it visits one goal after the other under a scripted navigation controller.
 
+See the paper's appendices "Policy and Controller Details" and "Discovery: Numerical Results".
+
 The scenario's physics are VMAS's own: a unit mass under a force, and drag that takes off a quarter of its velocity
 every tick. A velocity command becomes the force under which the agent settles to that velocity, so that it follows
 its command with a lag of a few ticks.
@@ -59,7 +61,7 @@ class Discovery:
     picture_px = PICTURE_PX
 
     def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
-        """Pursue the goals in one shot each; raises MtmError when the arrays disagree or a goal does not exist."""
+        """One rollout of one shot for each seed; raises MtmError when the arrays disagree or a goal does not exist."""
         _check(goals, noise, seeds, self.choices)
         starts_m = np.array([_start(np.random.default_rng(seed)) for seed in seeds])
         ticks = noise.shape[2]
@@ -71,7 +73,7 @@ class Discovery:
         ]
 
     def perform(self, noise: Floats, seeds: Sequence[int]) -> list[ControlHistory]:
-        """Drive to one goal, which the seed decides; the score is the distance that is left in the end."""
+        """Commands of a drive to one goal of the seed; the score is the remaining distance at its end."""
         generators = [np.random.default_rng(seed) for seed in seeds]
         starts_m = np.array([_start(generator) for generator in generators])
         goals = np.array([[generator.integers(self.choices)] for generator in generators])

@@ -1,5 +1,7 @@
 """VMAS's Football, three against three: a team that plays by rules against the simulator's own opponents.
 
+See the paper's appendices "Policy and Controller Details" and "Football: Numerical Results".
+
 The scenario's physics and pitch are VMAS's defaults: agents of a unit mass under forces of up to 0.1 N and no faster
 than 0.15 m/s, kick-offs at random places of either half. So are its opponents, but for their strength, which the paper
 does not state.
@@ -48,7 +50,7 @@ class Football:
     picture_px = PICTURE_PX
 
     def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
-        """Play by one strategy after the other, in one shot with all kick-offs in it.
+        """One rollout of one shot for each seed, which plays one strategy after the other, kick-offs included.
 
         Raises MtmError when the arrays disagree or a strategy does not exist.
         """
@@ -58,7 +60,7 @@ class Football:
         return [Rollout((Shot(0, times_s, own),), control) for own, control in zip(states, histories, strict=True)]
 
     def perform(self, noise: Floats, seeds: Sequence[int]) -> list[ControlHistory]:
-        """Play by a strategy that the seed decides; scored is 1 when the team scored at least once, and else 0."""
+        """Commands and scores of a game by a strategy of the seed; `SCORED` is 1 if the team scored, else 0."""
         drawn = np.array([[np.random.default_rng(seed).integers(STRATEGIES)] for seed in seeds])
         _check(drawn, noise[:, None], seeds)
         return _play(np.repeat(drawn, noise.shape[1], axis=1), noise, seeds)[1]

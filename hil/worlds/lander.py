@@ -1,5 +1,7 @@
 """The Lunar Lander world: Gymnasium's own physics, and proportional-derivative controllers that hover and land.
 
+See the paper's appendices "Policy and Controller Details" and "Lunar Lander: Numerical Results".
+
 Physics, engine rules and their dispersion are those of Gymnasium's continuous environment, without wind, which is its
 default. Lengths are the simulator's metres, of which the picture shows 20 x 13.3; x to the right, y up, angles
 counter-clockwise.
@@ -43,7 +45,7 @@ _STREAM = 23
 
 
 class LunarLander:
-    """One lander hovers over eight pads in turn: each a descent of its own, of which the hover is filmed.
+    """A lander that hovers over eight pads in turn; each is a descent of its own, of which the hover is filmed.
 
     When Gymnasium ends an environment (the lander touches the moon or leaves the picture at a side), the rollout goes
     on and is filmed all the same, since a camera would film it too; `run` counts such goals in the score "ended goals".
@@ -58,7 +60,7 @@ class LunarLander:
     picture_px = (lunar_lander.VIEWPORT_W, lunar_lander.VIEWPORT_H)
 
     def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
-        """Hover over each goal's pad for as many ticks as it has noise: one rollout for each seed.
+        """One rollout for each seed, which hovers over each goal's pad for as many ticks as the goal has noise.
 
         `goals` (rollouts, goals) are numbers of pads from left to right; `noise` (rollouts, goals, ticks, 2) is added
         to the side engine's and the main engine's command.
@@ -67,7 +69,7 @@ class LunarLander:
         return [_rollout(environment, pads, added, seed) for pads, added, seed in zip(goals, noise, seeds, strict=True)]
 
     def perform(self, noise: Floats, seeds: Sequence[int]) -> list[ControlHistory]:
-        """Descend and land between the flags, under noise until both legs stand on the ground.
+        """Commands and return of a landing between the flags, under noise until both legs stand on the ground.
 
         Then the engines are shut off: their noise would keep the lander moving, and Gymnasium waits until it rests.
         The score "episodic return" is the sum of Gymnasium's rewards until it ends the episode or `noise` does.
@@ -100,7 +102,7 @@ def hover_action(body: Body, pad_x_m: float) -> tuple[float, float]:
 
 
 def landing_action(body: Body, ground_y_m: float) -> tuple[float, float]:
-    """The same for a descent to the middle of the picture, the slower the nearer the ground."""
+    """The same commands for a descent to the middle of the picture, slower near the ground."""
     height_m = body.position.y - ground_y_m
     sink_mps = min(max(SINK_PER_S * height_m, SINK_MPS[0]), SINK_MPS[1])
     main = HOVER_THROTTLE - LIFT_PER_MPS * (sink_mps + body.linearVelocity.y)

@@ -1,10 +1,12 @@
 """The paper's Reacher: an arm of two links goes from target to target under a stochastic policy.
 
+See the paper's appendices "Policy and Controller Details" and "Reacher: Numerical Results".
+
 Gymnasium's Reacher-v5 (its own model file, MuJoCo's physics, two steps of 10 ms a tick: 50 Hz) and a policy trained by
 soft actor-critic. The policy's action is tanh(mean + std * eps) with eps standard normal, mean and std both functions
-of the observation; the keyed noise takes the place of eps. The paper's sigma = 1.0 is read as this unit variance: the
-return that it reports cannot be had with torque noise of standard deviation 1, whose penalty alone, 0.1 per squared
-unit in either joint, takes 10 off in 50 steps.
+of the observation; the keyed noise takes the place of eps. The paper's sigma = 1.0 is read as this unit variance: with
+torque noise of standard deviation 1 the return that it reports is impossible, since the penalty alone, 0.1 per squared
+unit in either joint, is 10 in 50 steps.
 """
 
 from collections.abc import Iterator, Sequence
@@ -56,7 +58,7 @@ class Reacher:
         self._policy = trained_policy()
 
     def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
-        """Go to one target after the other without a break, from a pose of the seed: one shot for each seed.
+        """One rollout of one shot for each seed, from a pose of the seed to one target after the other.
 
         `goals` (rollouts, goals), `noise` (rollouts, goals, ticks, axes) in units of the policy's own standard
         deviation. Score: the mean distance between fingertip and target at the end of each goal's time.
@@ -87,7 +89,7 @@ class Reacher:
         return [Rollout((shot,), control) for shot, control in zip(shots, histories, strict=True)]
 
     def perform(self, noise: Floats, seeds: Sequence[int]) -> list[ControlHistory]:
-        """Fifty steps from near the rest pose to a target of the seed, within 0.20 m in each axis.
+        """Commands and return of 50 steps from near the rest pose to a target of the seed within 0.20 m in each axis.
 
         `noise` is (rollouts, 50, axes). Score: the return, the sum of -|fingertip - target| - 0.1 |action|^2.
         """

@@ -22,7 +22,7 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Shot:
-    """One uninterrupted stretch of a rollout in front of the camera, `first_tick` being the tick that it begins with.
+    """One uninterrupted filmed part of a rollout, which begins with tick `first_tick`.
 
     `times_s` (n + 1,): instants of the frames, one before its first tick and one after each of its n ticks, on the
     recording's clock; `states` (n + 1, k): where everything is, in columns of the world's own.
@@ -72,7 +72,7 @@ class World(Protocol):
     picture_px: tuple[int, int]
 
     def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
-        """Pursue one goal after the other under noise, in full view: one rollout for each seed.
+        """One filmed rollout for each seed, which pursues one goal after the other under noise.
 
         `goals` (rollouts, goals) are numbers below `choices`; `noise` (rollouts, goals, ticks, axes) in units of the
         command, one goal being pursued for that many ticks. The seed decides everything else.
@@ -80,7 +80,7 @@ class World(Protocol):
         ...
 
     def perform(self, noise: Floats, seeds: Sequence[int]) -> list[ControlHistory]:
-        """Do the paper's task once for each seed under `noise` (rollouts, task_ticks, axes), unfilmed."""
+        """Commands and scores of the paper's task, once a seed, under `noise` (rollouts, task_ticks, axes)."""
         ...
 
     def pictures(self, shot: Shot) -> Iterator[Frame]:

@@ -79,7 +79,7 @@ def measure(
     silences: int,
     workers: int | None = None,
 ) -> list[Row]:
-    """Measure all detectors under the given conditions; the genie's interference is fitted to `silences` recordings."""
+    """The rows of all detectors under the conditions; the genie's interference is fitted to `silences` recordings."""
     groups = [
         [_cell(condition, plant, silences, number) for number in range(condition.rollouts)] for condition in asked
     ]

@@ -36,7 +36,7 @@ def rollout_parameters(job: Job, plant: MecanumParameters, silences: int, *, coh
 
 
 def read_rollout(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """Record one rollout and read it: how many of its symbols each detector has right, by the detector's name."""
+    """The number of symbols that each detector has right in one rollout, by the detector's name."""
     job = job_of(parameters)
     plant = plant_of(parameters)
     recording = record(job, plant, seed)
@@ -74,7 +74,7 @@ def read_coherency(job: Job, recording: Recording) -> Integers:
 
 
 def read_matched(job: Job, recording: Recording) -> Integers:
-    """Symbols (robots, windows) by the matched detector, blind to the plant, all robots together."""
+    """Symbols (robots, windows) by the matched detector, without knowing the plant, all robots jointly."""
     timing = Timing(ONSET_S, job.scheme.rate_hz)
     motions = _motions(recording.seen, job.scheme)
     windows = [

@@ -125,7 +125,7 @@ def measure(
     console: Console,
     workers: int | None = None,
 ) -> tuple[list[Row], float]:
-    """Record and read a world under the conditions; beside the rows the processor time that all of it took, seconds."""
+    """The rows of a world under the conditions, and the processor time, seconds, that all cells took."""
     groups = [_cells(world, condition, effort) for condition in conditions]
     results = run_sweep(decode_batch, [cell for group in groups for cell in group], store, console, workers)
     taken = iter(results)
