@@ -117,7 +117,7 @@ def _run(settings: RunSettings, clock: SimulatedClock, robots: list[_Robot]) -> 
 
 
 def _loop(settings: RunSettings, clock: SimulatedClock, step: Callable[[int, float], None]) -> LoopStats:
-    # A tick at the very end would have no motion after it.
+    # A tick that falls on the very end would have no motion to show.
     end_s = settings.seconds - 1e-6
     return run_loop(
         clock, settings.key.scheme.rate_hz, step, start_s=settings.onset_s, stop=lambda: clock.now() >= end_s

@@ -36,7 +36,7 @@ from mtm_onboard.links.robomaster_telemetry import (
 )
 from mtm_onboard.protocol import MtmError
 
-MAX_PUSHES_HZ = 200
+MOST_PUSHES_HZ = 200
 
 _DONE = b"\x00"
 _REFUSED = b"\x01"
@@ -159,7 +159,7 @@ class CanMotionController:
     def _on_subscribe(self, message: Message, now_s: float) -> bytes:
         wanted = parse_subscription(message.payload)
         unknown = next((topic for topic in wanted.topics if topic not in TOPICS), 0)
-        granted = not unknown and 1 <= wanted.rate_hz <= MAX_PUSHES_HZ
+        granted = not unknown and 1 <= wanted.rate_hz <= MOST_PUSHES_HZ
         if granted:
             self._streams[wanted.stream] = _Stream(wanted, now_s)
         head = _DONE if granted else _REFUSED

@@ -1,4 +1,4 @@
-"""How three autopilots treat set-points according to their public sources and manuals; independent of the transport.
+"""How three autopilots treat set-points, as their public sources and manuals have it; independent of the transport.
 
 - ArduPilot Copter and Rover, manuals "Copter/Rover Commands in Guided Mode" and the sources behind them: which frames
   and masks are obeyed, and that a vehicle stops when no set-point came for GUID_TIMEOUT, 3 s by default.
@@ -35,7 +35,7 @@ class Firmware:
     vehicle_type: int
     guided_mode: int
     other_mode: int
-    coordinate_frames: frozenset[int]
+    frames: frozenset[int]
     velocity_bits: int
     is_holonomic: bool
     loss_s: float
@@ -51,7 +51,7 @@ class Firmware:
         """What a SET_POSITION_TARGET_LOCAL_NED demands, in REP-103; None for one that is not obeyed as a velocity."""
         mask, frame = setpoint.type_mask, setpoint.coordinate_frame
         ahead, right, turn = setpoint.vx, setpoint.vy, setpoint.yaw_rate
-        if frame not in self.coordinate_frames or not all(map(math.isfinite, (ahead, right, setpoint.vz, turn))):
+        if frame not in self.frames or not all(map(math.isfinite, (ahead, right, setpoint.vz, turn))):
             return None
         ignores_too_much = mask & (self.velocity_bits | _YAW_RATE)
         ignores_enough = not ~mask & (_POSITION | _ACCELERATION | _YAW)
@@ -71,15 +71,15 @@ class Firmware:
 _ALL_FRAMES = frozenset({LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED})
 
 COPTER: Final = Firmware(
-    autopilot=3, vehicle_type=2, guided_mode=4, other_mode=5, coordinate_frames=_ALL_FRAMES,
-    velocity_bits=_VELOCITY_XYZ, is_holonomic=True, loss_s=3.0,
+    autopilot=3, vehicle_type=2, guided_mode=4, other_mode=5, frames=_ALL_FRAMES, velocity_bits=_VELOCITY_XYZ,
+    is_holonomic=True, loss_s=3.0,
 )  # fmt: skip
 ROVER: Final = Firmware(
-    autopilot=3, vehicle_type=10, guided_mode=15, other_mode=4, coordinate_frames=_ALL_FRAMES,
-    velocity_bits=_VELOCITY_XY, is_holonomic=False, loss_s=3.0,
+    autopilot=3, vehicle_type=10, guided_mode=15, other_mode=4, frames=_ALL_FRAMES, velocity_bits=_VELOCITY_XY,
+    is_holonomic=False, loss_s=3.0,
 )  # fmt: skip
 PX4: Final = Firmware(
     autopilot=12, vehicle_type=2, guided_mode=6 << 16, other_mode=4 << 16 | 3 << 24,
-    coordinate_frames=frozenset({LOCAL_NED, BODY_NED}), velocity_bits=_VELOCITY_XYZ, is_holonomic=True, loss_s=1.0,
+    frames=frozenset({LOCAL_NED, BODY_NED}), velocity_bits=_VELOCITY_XYZ, is_holonomic=True, loss_s=1.0,
     leaves_on_loss=True, stream_s=1.0, stream_gap_s=0.5,
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The vehicle's end of a MAVLink wire: an autopilot that obeys and ignores the same messages as a real one."""
+"""The vehicle's end of a MAVLink wire: an autopilot that obeys what a real one obeys, and ignores the rest."""
 
 import math
 from collections.abc import Callable
@@ -21,7 +21,7 @@ _CUSTOM_MODE, _ARMED = 1, 128  # MAV_MODE_FLAG
 _ACCEPTED, _REJECTED_FOR_NOW, _UNSUPPORTED, _FAILED = 0, 1, 3, 4  # MAV_RESULT
 _CRITICAL = 2  # MAV_SEVERITY
 _ACTIVE = 4  # MAV_STATE
-_MAX_READS = 256
+_MOST_READS = 256
 # A push that is due within this part of a period counts as due: instants are sums of decimal fractions.
 _SLACK = 1e-6
 
@@ -31,8 +31,8 @@ class MavlinkVehicle:
 
     It obeys set-points and requests that are addressed to it, the former only in its guided mode and armed, and counts
     in `ignored_setpoints` those that it ignores for their frame, mask or values. `signing_key` has it require
-    signatures. With `goes_on` it never stops when set-points end, the worst case. `can_arm`
-    False is a vehicle whose own checks fail. `pilot_switches` and `pilot_disarms` are the pilot's actions.
+    signatures. A vehicle that `goes_on` never stops for want of set-points, the worst that one could do. `can_arm`
+    False is a vehicle whose own checks fail. `pilot_switches` and `pilot_disarms` are the pilot's doing.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class MavlinkVehicle:
         self._engage()
 
     def say(self, severity: int, text: str) -> None:
-        """Send a status text."""
+        """Send a text to whoever listens."""
         self._send(self._codec.messages.MAVLink_statustext_message(severity, text.encode("ascii")))
 
     def _engage(self) -> None:
@@ -102,7 +102,7 @@ class MavlinkVehicle:
     def _received(self) -> list[Any]:
         found: list[Any] = []
         try:
-            for _ in range(_MAX_READS):
+            for _ in range(_MOST_READS):
                 data = self._port.read()
                 if not data:
                     break

@@ -12,11 +12,11 @@ from mtm_onboard.links.plaintext_messages import MOST_DEGPS, MOST_MPS, Splitter
 from mtm_onboard.links.robomaster_messages import clockwise_deg, counter_clockwise_rad, flipped
 from mtm_onboard.model.velocity import STOP
 
-MAX_QUEUED = 512
+MOST_QUEUED = 512
 MODES = ("chassis_lead", "gimbal_lead", "free")
 
 _LONGEST_COMMAND = 1024
-_MAX_RPM = 1000.0
+_MOST_RPM = 1000.0
 _VERSION = "version 00.00.00.00"
 _BATTERY = "84 "
 
@@ -24,13 +24,13 @@ _BATTERY = "84 "
 class PlaintextMotionController:
     """Obeys text that arrives on `ports` and answers it; `poll` does everything that is due.
 
-    The first port that sends `command` owns the robot until it sends `quit` or its client disconnects; other ports get
-    no answer. SDK mode is the work mode of `controller`, which should have no deadman, as the robot has none: a speed
+    The first port that says `command` has the robot until it says `quit` or its client goes; everybody else meets
+    silence. SDK mode is the work mode of `controller`, which should have no deadman, as the robot has none: a speed
     holds until the next one or the end of SDK mode. While the gimbal leads, the chassis ignores turns.
 
     Obeyed are `command`, `quit`, `version`, `robot mode`, `robot battery ?`, and `chassis` with `speed`, `wheel`,
-    `push` and the queries; anything else fails. `obeyed` and `refused` count commands of the owner,
-    `ignored` those of other ports, `dropped` those beyond what the robot queues. With `pushes_heading` pushed positions
+    `push` and the queries; anything else fails. `obeyed` and `refused` count commands of the port that has the robot,
+    `unheard` those of the others, `dropped` those beyond what the robot queues. With `pushes_heading` pushed positions
     have the heading as a third number, as newer firmware sends, and otherwise two.
     """
 
@@ -38,7 +38,7 @@ class PlaintextMotionController:
         self.controller = controller
         self.obeyed = 0
         self.refused = 0
-        self.ignored = 0
+        self.unheard = 0
         self.dropped = 0
         self.mode = MODES[0]
         self._splitters = {port: Splitter(_LONGEST_COMMAND) for port in ports}
@@ -62,7 +62,7 @@ class PlaintextMotionController:
 
     @property
     def is_taken(self) -> bool:
-        """Whether a port owns the robot in SDK mode."""
+        """Whether a port has the robot in SDK mode."""
         return self._owner is not None
 
     @property
@@ -94,8 +94,8 @@ class PlaintextMotionController:
                     self._release()
             else:
                 queue += [(port, text) for text in splitter.feed(data)]
-        self.dropped += max(0, len(queue) - MAX_QUEUED)
-        return queue[:MAX_QUEUED]
+        self.dropped += max(0, len(queue) - MOST_QUEUED)
+        return queue[:MOST_QUEUED]
 
     def _obey(self, port: Port, text: str, now_s: float) -> None:
         has_robot = port is self._owner
@@ -116,7 +116,7 @@ class PlaintextMotionController:
         if has_robot:
             port.answer(f"{answer}{echo};".encode("ascii"))
         else:
-            self.ignored += 1
+            self.unheard += 1
 
     def _enter(self, port: Port) -> str:
         self._owner = port
@@ -166,7 +166,7 @@ class PlaintextMotionController:
 
     def _on_wheel(self, words: tuple[str, ...], now_s: float) -> str:
         wanted = values(words, ("w1", "w2", "w3", "w4"))
-        if not all(abs(rpm) <= _MAX_RPM for rpm in wanted.values()):
+        if not all(abs(rpm) <= _MOST_RPM for rpm in wanted.values()):
             raise RefusalError(FAILED)
         # DJI's page swaps the rear wheels; this is the order of its binary protocol and of a client tested on robots.
         front_right, front_left, rear_left, rear_right = (

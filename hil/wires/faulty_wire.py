@@ -155,7 +155,7 @@ class FaultyBus:
 
 
 class FaultyText(ByteLink):
-    """Our end of a line of text over the wire, in place of a file descriptor."""
+    """Our end of a line of text over the wire, in the place of a descriptor's."""
 
     def __init__(self, wire: FaultyWire) -> None:
         self._wire = wire

@@ -1,6 +1,6 @@
-"""The lines between a simulated RoboMaster EP and its client: one like a UART, and TCP with UDP beside it.
+"""The lines on which a simulated RoboMaster EP meets its client: one like a UART, and TCP with UDP beside it.
 
-Nothing here waits. What a client does not read in time is lost, in whole texts.
+Nothing here ever waits. What a client is too slow to read is lost, whole texts at a time.
 """
 
 import os
@@ -13,7 +13,7 @@ from typing import Protocol
 from mtm_onboard.links.plaintext_messages import PUSH_PORT
 
 _READ_BYTES = 65_536
-_MAX_UNSENT_BYTES = 16_384
+_MOST_UNSENT_BYTES = 16_384
 
 
 class Port(Protocol):
@@ -61,7 +61,7 @@ class LinePort:
 
     def answer(self, text: bytes) -> None:
         """Send `text`, or lose it when the client does not read."""
-        if len(self._unsent) + len(text) > _MAX_UNSENT_BYTES:
+        if len(self._unsent) + len(text) > _MOST_UNSENT_BYTES:
             self.lost_texts += 1
         else:
             self._unsent += text

@@ -293,7 +293,7 @@ TARGETS: dict[str, Callable[[], Target]] = {
 
 
 def _use(link: Transport, now_s: float) -> bool:
-    """Service the link and send a command; False when it reports that it is lost or taken over."""
+    """Read, and send a command; False when the link says that it is lost or taken over."""
     link.service(now_s)
     try:
         link.send(COMMANDS[0])

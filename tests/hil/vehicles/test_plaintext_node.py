@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hil.vehicles.motion_controller import MotionController
-from hil.vehicles.plaintext_node import MAX_QUEUED, PlaintextMotionController
+from hil.vehicles.plaintext_node import MOST_QUEUED, PlaintextMotionController
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from tests.hil.vehicles.floating_plant import FloatingPlant
 
@@ -66,7 +66,7 @@ def test_a_robot_is_silent_before_command_and_does_nothing():
     assert robot.say("version;chassis speed x 1 y 0 z 0;quit;robot mode ?;nonsense;commands;command x;") == ""
     assert robot.plant.velocity_body == STOP
     assert not robot.controller.work_mode
-    assert robot.node.ignored == 7
+    assert robot.node.unheard == 7
 
 
 def test_command_engages_the_motors_and_a_second_one_says_so(robot):
@@ -262,8 +262,8 @@ def test_a_pose_is_told_from_where_the_robot_was_switched_on():
 
 
 def test_more_commands_than_the_robot_queues_are_lost(robot):
-    answers = robot.say("version;" * (MAX_QUEUED + 88))
-    assert answers.count(";") == MAX_QUEUED
+    answers = robot.say("version;" * (MOST_QUEUED + 88))
+    assert answers.count(";") == MOST_QUEUED
     assert robot.node.dropped == robot.node.faults == 88
 
 
