@@ -1,4 +1,4 @@
-"""Checks of a run's files and sockets: the key, the journal, the control socket, the base commands' port."""
+"""The files and sockets of a run: the key, the journal, the control socket, the base commands' port."""
 
 import os
 import pwd
@@ -81,7 +81,7 @@ def check_control(settings: ControlSettings | None) -> Finding:
 
 
 def check_source(settings: SourceSettings) -> Finding:
-    """Check that the base commands' port is free."""
+    """The base commands' port is free."""
     if settings.port is None:
         return Finding("source", "pass", "base commands from standard input")
     try:
