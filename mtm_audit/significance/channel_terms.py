@@ -38,7 +38,7 @@ class ChannelTerms:
     """What evidence needs of one channel.
 
     `groups` (windows,) numbers the windows that are played from one waveform, `positions` (groups,) says which message
-    position each carries. `candidates` (shown positions, k) are the symbols that are looked at, those that score best;
+    position each carries. `timing` is what all channels together found, `alone` what this one did by itself. `candidates` (shown positions, k) are the symbols that are looked at, those that score best;
     `tones` (groups, k, injected axes, 2 K) theirs. `shared` when one codebook serves all positions (fixed schedule).
     """
 
@@ -55,6 +55,7 @@ class ChannelTerms:
     alphabet_size: int
     shared: bool
     strength: float
+    alone: Timing
     _terms: dict[Timing, "Terms"] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -218,6 +219,7 @@ def channel_terms(
         alphabet_size=scheme.alphabet_size,
         shared=shared,
         strength=found.strength,
+        alone=found.timing if reading.alone is None else reading.alone,
     )
 
 
