@@ -38,8 +38,9 @@ class ChannelTerms:
     """What evidence needs of one channel.
 
     `groups` (windows,) numbers the windows that are played from one waveform, `positions` (groups,) says which message
-    position each carries. `timing` is what all channels together found, `alone` what this one did by itself. `candidates` (shown positions, k) are the symbols that are looked at, those that score best;
+    position each carries. `candidates` (shown positions, k) are the symbols that are looked at, those that score best;
     `tones` (groups, k, injected axes, 2 K) theirs. `shared` when one codebook serves all positions (fixed schedule).
+    `timing` is what all channels together found; `alone` and `strength` are what this one found by itself.
     """
 
     prepared: Prepared
@@ -218,7 +219,7 @@ def channel_terms(
         law=scheme.power,
         alphabet_size=scheme.alphabet_size,
         shared=shared,
-        strength=found.strength,
+        strength=found.strength if reading.alone_strength is None else reading.alone_strength,
         alone=found.timing if reading.alone is None else reading.alone,
     )
 

@@ -61,7 +61,8 @@ class MatchedDetector:
                 del motions[number]
         readings = self._read_together(codebook, channels, prepared, list(motions), searched, onset) if motions else {}
         for number, reading in readings.items():
-            readings[number] = replace(reading, alone=alone[number][0].timing)
+            own = alone[number][0]
+            readings[number] = replace(reading, alone=own.timing, alone_strength=own.evidence)
         return [readings[number] if number in readings else refusals[number] for number in range(len(observations))]
 
     def strengths(
