@@ -3,8 +3,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+SITE_VENV := .venv-site
 
-.PHONY: setup demo test lint bench mutants firmware deb deb-test clean
+.PHONY: setup demo test lint bench mutants firmware site deb deb-test clean
 
 setup: $(STAMP)
 
@@ -29,6 +30,15 @@ lint: setup
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy --no-error-summary
 
+# The documents as a site in build/site; a broken link is an error.
+site: $(SITE_VENV)/.installed
+	NO_MKDOCS_2_WARNING=1 $(SITE_VENV)/bin/mkdocs build --strict
+
+$(SITE_VENV)/.installed: docs/requirements.txt
+	$(PYTHON) -m venv $(SITE_VENV)
+	$(SITE_VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r docs/requirements.txt
+	@touch $@
+
 firmware: setup
 	$(MAKE) -C firmware_shim
 
@@ -46,4 +56,4 @@ bench: setup
 	$(BIN)/pytest tests/benchmarks --benchmark-enable -s
 
 clean:
-	rm -rf $(VENV) out build dist firmware_shim/build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(SITE_VENV) out build dist firmware_shim/build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

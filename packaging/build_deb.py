@@ -59,7 +59,7 @@ def lay_out(tree: Path) -> None:
     licence = (ROOT / "LICENSE").read_text(encoding="utf-8")
     indented = "".join(f" {line or '.'}\n" for line in licence.splitlines())
     place(documents / "copyright", COPYRIGHT + indented)
-    for page in ("README.md", "docs/doctor.md"):
+    for page in ("README.md", *(f"docs/{name}.md" for name in ("onboard", "doctor", "failsafes", "journal"))):
         place(documents / page, (ROOT / page).read_text(encoding="utf-8"))
     for example in (ROOT / "docs/robot.example.toml", HERE / "cloud-init/user-data.yaml"):
         place(documents / "examples" / example.name, example.read_text(encoding="utf-8"))

@@ -9,6 +9,7 @@ from scipy.special import softmax
 from mtm_audit.decoding.assignment import assign_tracks
 from mtm_audit.decoding.decoding import CERTAIN, ChannelDecoding, ChannelState, Decoding
 from mtm_audit.decoding.frames import Delivered, Heard, decode_frames
+from mtm_audit.decoding.leaps import without_leaps
 from mtm_audit.decoding.order import order_is_known
 from mtm_audit.decoding.pooling import pooled_posteriors, pooled_symbols
 from mtm_audit.decoding.readings import Progress, Readings, read_tracks
@@ -30,17 +31,21 @@ MORE_DECOYS = 5
 def decode_tracks(
     tracks: Sequence[Track], key: Key, settings: DecodeSettings, progress: Progress | None = None
 ) -> Decoding:
-    """Decode a message from tracks under a key.
+    """Decode a message from tracks under a key, whose leaps are taken out first.
 
     Evidence by decoys that lies near the limit is judged anew by five times as many, since a tail known from few of
     them is taken for heavy. `progress(stage, fraction)` is called now and then. Raises MtmError when no channel can be
     read at all.
     """
-    decoding = _decoded(tracks, key, settings, progress)
+    mended = [without_leaps(track) for track in tracks]
+    tracks = [item.track for item in mended]
+    leaps = {item.track.name: item.leaps for item in mended if item.leaps}
+    decoding = replace(_decoded(tracks, key, settings, progress), leaps=leaps)
     by_decoys = decoding.evidence.nats is None
     if not by_decoys or not settings.threshold < decoding.evidence.p_value <= NEARLY:
         return decoding
-    return _decoded(tracks, key, replace(settings, decoys=MORE_DECOYS * settings.decoy_count), progress)
+    more = replace(settings, decoys=MORE_DECOYS * settings.decoy_count)
+    return replace(_decoded(tracks, key, more, progress), leaps=leaps)
 
 
 def _decoded(tracks: Sequence[Track], key: Key, settings: DecodeSettings, progress: Progress | None) -> Decoding:

@@ -1,6 +1,7 @@
 """The answer of a decode, and all it rests on."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 from mtm_audit.decoding.frames import Delivered
@@ -58,6 +59,7 @@ class Decoding:
     is the number they spell, or the frame's payload, given only with the verdict "decoded". `order_known` is False when
     the message repeats and nothing shows which of its symbols comes first. `frames` are the framed messages found, in
     the order in which they were sent, `message` being the last; a single one that does not hold is the best guess.
+    `leaps` counts by track name the leaps that were taken out.
     """
 
     verdict: VerdictName
@@ -74,6 +76,7 @@ class Decoding:
     key_id: str
     scheme: Scheme
     settings: DecodeSettings
+    leaps: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def uncertain(self) -> tuple[int, ...]:

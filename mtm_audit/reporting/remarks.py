@@ -13,6 +13,8 @@ _GAP_SHARE = 0.2
 def remarks(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
     """One sentence for each thing that does not fit, the recording's own warnings first."""
     found = [*recording.warnings, *_of_the_recording(recording, decoding)]
+    if decoding.verdict != "absent":
+        found += _of_exchanged_tracks(decoding)
     for channel in decoding.channels:
         found += _of_a_channel(channel, decoding)
     return (*found, *advice(recording, decoding))
@@ -20,6 +22,11 @@ def remarks(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
 
 def _of_the_recording(recording: Recording, decoding: Decoding) -> list[str]:
     scheme, found = decoding.scheme, []
+    found += [
+        f"track {name} leaps {'once' if count == 1 else f'{count} times'}, farther than it ever moves in one step; the "
+        "observations after a leap were left out"
+        for name, count in decoding.leaps.items()
+    ]
     message_s = scheme.message_ticks / scheme.rate_hz
     if recording.duration_s < message_s:
         found.append(
@@ -32,6 +39,24 @@ def _of_the_recording(recording: Recording, decoding: Decoding) -> list[str]:
             f"{rate_hz:.1f} observations a second are too few for a band up to {scheme.band_hz[1]:g} Hz; record with "
             f"at least {needed_hz:g}"
         )
+    return found
+
+
+def _of_exchanged_tracks(decoding: Decoding) -> list[str]:
+    """Which bodies are in other tracks than names say; two that are in each other's are told together."""
+    tracks = {
+        item.channel.body: item.glimpse.name
+        for item in decoding.channels
+        if item.exchanged and item.glimpse is not None
+    }
+    found, told = [], set()
+    for body, track in tracks.items():
+        other = next((name for name in tracks if name != body and tracks[name] == body and track == name), None)
+        if other is not None and body not in told:
+            found.append(f"{body} and {other} are exchanged: each one's motion is in the track named after the other")
+            told |= {body, other}
+        elif body not in told:
+            found.append(f"{body} is the track {track}, though names say otherwise: its motion is there")
     return found
 
 
@@ -48,11 +73,6 @@ def _of_a_channel(decoding: ChannelDecoding, whole: Decoding) -> list[str]:
         )
     if reading is None:
         return [*found, decoding.refusal or f"track {glimpse.name} is too short to read channel {channel.name}"]
-    if decoding.exchanged and whole.verdict != "absent":
-        found.append(
-            f"{channel.body} is the track {glimpse.name}, though names say otherwise: its motion plays channel "
-            f"{channel.name}"
-        )
     if decoding.also_shows and whole.verdict != "absent":
         found.append(f"track {glimpse.name} plays channel {decoding.also_shows}, which is not that of {channel.body}")
     nominal_hz = whole.scheme.rate_hz

@@ -21,7 +21,7 @@ from scipy.special import log_softmax, logsumexp
 
 from mtm_audit.model.timing import Timing
 from mtm_audit.model.track import Floats
-from mtm_audit.significance.channel_terms import ChannelTerms, Terms
+from mtm_audit.significance.channel_terms import ChannelTerms, Terms, or_silent
 from mtm_audit.significance.gains import all_levels
 from mtm_audit.significance.likelihood import Hypotheses
 from mtm_audit.significance.neighbourhood import at_phase_of
@@ -116,11 +116,14 @@ def _largest(values: Floats, count: int) -> Integers:
 
 
 def _anchor(channels: Sequence[ChannelTerms], channel: ChannelTerms) -> Timing:
-    """The timing of the channel in `channels` that shows most, as `channel` counts its windows."""
+    """The timing of the channel in `channels` that shows most, as `channel` counts its windows.
+
+    What that channel found by itself: a timing that `channel` had a say in would depend on its candidates.
+    """
     strongest = max(channels, key=lambda other: other.strength)
     if strongest is channel:
         return channel.timing
-    return at_phase_of(channel.timing, strongest.timing, channel.span.window_ticks)
+    return at_phase_of(channel.timing, strongest.alone, channel.span.window_ticks)
 
 
 def _alike(channels: Sequence[ChannelTerms]) -> bool:
@@ -177,11 +180,37 @@ def _symbol(own: Sequence[_Own], showing: Sequence[int], position: int) -> Symbo
 def _symbol_nats(own: Sequence[_Own], showing: Sequence[int], position: int, symbol: int) -> float:
     """Log e-value of one candidate: by the prior, and by what all others say."""
     by_prior = sum(_by_prior(own[row], position, symbol) for row in showing)
+    if len(showing) > 1:
+        by_prior = float(np.logaddexp(by_prior, _together(own, showing, position, symbol)) - np.log(2.0))
     others = [_by_others(own, row, showing, position, symbol) for row in showing]
     if any(value is None for value in others):
         return by_prior
     by_others = sum(value for value in others if value is not None)
     return float(np.logaddexp(by_others + np.log(_OTHERS), by_prior + np.log(1.0 - _OTHERS)))
+
+
+def _together(own: Sequence[_Own], showing: Sequence[int], position: int, symbol: int) -> float:
+    """Log e-value of a candidate that several channels carry, each with a waveform of its own, under one hypothesis."""
+    items = [own[row] for row in showing]
+    channels = [item.channel for item in items]
+    places = [_column(channel, position, symbol) for channel in channels]
+    if not _alike(channels):
+        return -np.inf
+    tables = [channel.at(_anchor(channels, channel)) for channel in channels]
+
+    def said(tables_of: Callable[[Terms], Floats]) -> Floats:
+        found = []
+        for channel, terms, place in zip(channels, tables, places, strict=True):
+            if place is not None:
+                found.append(or_silent(channel.by_position(tables_of(terms))[..., place[0], place[1]]))
+        return np.asarray(np.sum(found, axis=0))
+
+    first = tables[0]
+    pairs = _largest(logsumexp(said(lambda table: table.coarse), axis=(1, 2)) + first.log_priors, _PAIRS)
+    fine = (said(lambda table: table.fine(pairs)) + _prior(first, pairs)).ravel()
+    chosen = _largest(fine, _HYPOTHESES)
+    exact = said(lambda table: table.exact(table.hypotheses(pairs, chosen)))
+    return float(logsumexp(exact + _prior(first, pairs).ravel()[chosen]))
 
 
 def _column(channel: ChannelTerms, position: int, symbol: int) -> tuple[int, int] | None:

@@ -30,6 +30,7 @@ class Silence:
 
 
 SILENCE = Silence()
+"""No message: the modulator plays no noise."""
 
 # What a modulator plays; a sequence is one channel's own symbols of every slot.
 Played = Message | Sequence[int] | Silence
