@@ -39,11 +39,11 @@ def bench(options: BenchOptions, console: Console) -> None:
     silences = _QUICK_SILENCES if options.quick else _SILENCES
     with CellStore(options.cells) as store:
         rows = measure(asked, plant, store, console, silences=silences)
-    said = [*summary(rows), _capacity_sentence(plant, silences)]
+    sentences = [*summary(rows), _capacity_sentence(plant, silences)]
     console.print(rich_table(rows))
-    print("\n".join(said))
+    print("\n".join(sentences))
     if options.out is not None:
-        write_csv(options.out, rows, (_command(options), f"{plant}", *said))
+        write_csv(options.out, rows, _command(options), (f"{plant}", *sentences))
         print(f"wrote {options.out}")
     if options.plot is not None:
         draw_plot(options.plot, rows)

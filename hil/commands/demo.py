@@ -1,4 +1,4 @@
-"""`mtm-hil demo`: the whole way of a message, from a fresh key to the auditor's verdicts."""
+"""`mtm-hil demo`: a message from a fresh key to the auditor's verdicts."""
 
 import json
 import os
@@ -77,9 +77,7 @@ def _run_all(folder: Path, commands: Sequence[str], codes: tuple[int, ...] = (0,
         )
         if done.returncode not in codes:
             words = done.stderr.strip().splitlines()
-            raise MtmError(
-                f"'{command}' ended with code {done.returncode} ({words[-1] if words else 'it said nothing'})"
-            )
+            raise MtmError(f"'{command}' ended with code {done.returncode} ({words[-1] if words else 'no output'})")
         return done.stdout
 
     for command in commands:

@@ -1,13 +1,12 @@
-"""`mtm-hil endurance`: what a long run uses up, and whether its message is still there at the end."""
+"""`mtm-hil endurance`: the resources that a long run consumes, and whether its message can still be decoded."""
 
-import csv
 from dataclasses import astuple, fields
 from pathlib import Path
 
 from rich.console import Console
 
 from hil.experiments.hardening.endurance import SYMBOLS, Checkpoint, endure
-from mtm_onboard.protocol.atomicfile import replacing
+from hil.experiments.runs.result_file import write_result_csv
 
 
 def endurance(hours: float, checkpoints: int, seed: int, out: Path | None, console: Console) -> None:
@@ -21,11 +20,8 @@ def endurance(hours: float, checkpoints: int, seed: int, out: Path | None, conso
             f"{len(SYMBOLS)} symbols right, p = {one.p_value:.1e}"
         )
     if out is not None:
-        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            file.write(f"# mtm-hil endurance --hours {hours:g} --checkpoints {checkpoints} --seed {seed} --out {out}\n")
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow([field.name for field in fields(Checkpoint)])
-            writer.writerows(map(_row, found))
+        command = f"mtm-hil endurance --hours {hours:g} --checkpoints {checkpoints} --seed {seed} --out {out}"
+        write_result_csv(out, command, [field.name for field in fields(Checkpoint)], map(_row, found))
         print(f"wrote {out}")
 
 

@@ -1,6 +1,5 @@
 """`mtm-hil false-alarms`: verdicts on recordings in which there is nothing to read."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +8,10 @@ from rich.console import Console
 from hil.experiments.detectors.false_alarms import NO_MESSAGE, WRONG_KEY, decode_nothing, false_alarm_cells, summarise
 from hil.experiments.runs.cells import CellStore
 from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
-from mtm_onboard.protocol.atomicfile import replacing
 
+_COLUMNS = ("arm", "detector", "decodes", "decoded", "inconclusive", "ks_p", "level", "below", "low", "high")
 _LEVELS = (0.5, 0.1, 0.05, 0.01, 0.001, 0.0001)
 
 
@@ -40,11 +40,6 @@ def false_alarms(
                  level, below, f"{low:.6f}", f"{high:.6f}")
             )  # fmt: skip
     if out is not None:
-        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            file.write(f"# mtm-hil false-alarms -n {decodes} --detector {detector} --seed {seed} --out {out}\n")
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(
-                ("arm", "detector", "decodes", "decoded", "inconclusive", "ks_p", "level", "below", "low", "high")
-            )
-            writer.writerows(rows)
+        command = f"mtm-hil false-alarms -n {decodes} --detector {detector} --seed {seed} --out {out}"
+        write_result_csv(out, command, _COLUMNS, rows)
         print(f"wrote {out}")

@@ -1,54 +1,51 @@
-"""`mtm-hil faults`: what a robot does when its wire goes wrong."""
+"""`mtm-hil faults`: a robot under faults of its wire."""
 
-import csv
 from dataclasses import astuple, fields
 from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.hardening.faults import Line, Outcome, fault_cell, fault_cells, line_of
+from hil.experiments.hardening.faults import Outcome, Row, fault_cell, fault_cells, row_of
 from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
-from mtm_onboard.protocol.atomicfile import replacing
 
 _NO_LOSS = "no"
+_COLUMNS = (
+    "wire", "fault", "loss", "seed", "stops", "is_fresh", "is_read", "silent_deadline_s", "lost_deadline_s",
+    *(field.name for field in fields(Outcome)),
+)  # fmt: skip
 
 
 def faults(seeds: int, seed: int, workers: int | None, out: Path | None, cells: Path, console: Console) -> bool:
-    """Measure, print and, where asked, write the matrix; False when some cell is not as it should be."""
+    """Measure, print and, where asked, write the matrix; False when a run fails a requirement."""
     asked = fault_cells(seeds, seed)
     with CellStore(cells) as store:
         results = run_sweep(fault_cell, asked, store, console, workers)
-    lines = [line_of(cell, result) for cell, result in zip(asked, results, strict=True)]
+    lines = [row_of(cell, result) for cell, result in zip(asked, results, strict=True)]
     for line in lines:
         print(_sentence(line))
     wrong = sum(not (line.stops and line.is_fresh and line.is_read) for line in lines)
-    print(f"{len(lines)} runs, {wrong} of them not as they should be")
+    print(f"{len(lines)} runs, {wrong} of them failed")
     if out is not None:
-        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            file.write(f"# mtm-hil faults -n {seeds} --seed {seed} --out {out}\n")
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(
-                ("wire", "fault", "loss", "seed", "stops", "is_fresh", "is_read", "silent_deadline_s",
-                 "lost_deadline_s", *(field.name for field in fields(Outcome)))
-            )  # fmt: skip
-            writer.writerows(_row(line) for line in lines)
+        command = f"mtm-hil faults -n {seeds} --seed {seed} --out {out}"
+        write_result_csv(out, command, _COLUMNS, map(_row, lines))
         print(f"wrote {out}")
     return wrong == 0
 
 
-def _sentence(line: Line) -> str:
+def _sentence(line: Row) -> str:
     one = line.outcome
     return (
-        f"{line.wire}, {line.fault}, link {line.loss or 'kept'}: still {one.silent_stop_s:.2f} s after the last base "
-        f"command ({line.silent_deadline_s:.2f} allowed){_loss(line)}; commands {one.arrived_s:.2f} s old on arrival, "
-        f"in force until {one.held_s:.2f} s, {one.altered} altered; {one.sent} of {one.windows} windows sent, "
-        f"message {'read' if one.is_decoded else 'not read'}"
-        f"{'' if line.stops and line.is_fresh and line.is_read else ' - NOT AS IT SHOULD BE'}"
+        f"{line.wire}, {line.fault}, link {line.loss or 'kept'}: stopped {one.silent_stop_s:.2f} s after the last base "
+        f"command ({line.silent_deadline_s:.2f} allowed){_loss(line)}; commands at most {one.arrived_s:.2f} s old "
+        f"on arrival and {one.held_s:.2f} s in force, {one.altered} altered; {one.sent} of {one.windows} windows sent, "
+        f"message {'decoded' if one.is_decoded else 'not decoded'}"
+        f"{'' if line.stops and line.is_fresh and line.is_read else ' - FAILED'}"
     )
 
 
-def _loss(line: Line) -> str:
+def _loss(line: Row) -> str:
     if not line.loss:
         return ""
     if line.lost_deadline_s is None:
@@ -56,7 +53,7 @@ def _loss(line: Line) -> str:
     return f", {line.outcome.lost_stop_s:.2f} s after the loss ({line.lost_deadline_s:.2f} allowed)"
 
 
-def _row(line: Line) -> tuple[object, ...]:
+def _row(line: Row) -> tuple[object, ...]:
     deadline = "none" if line.lost_deadline_s is None else f"{line.lost_deadline_s:g}"
     numbers = [f"{value:.6g}" if isinstance(value, float) else value for value in astuple(line.outcome)]
     return (

@@ -58,11 +58,11 @@ def film(options: FilmOptions, console: Console) -> None:
             save_key(key, folder / KEY_NAME)
         with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
             task = progress.add_task("filming", total=len(rollout.shots[0].times_s))
-            frames = _counted(_frames(world, rollout, options), lambda: progress.advance(task))
+            frames = _counted(_pictures(world, rollout, options), lambda: progress.advance(task))
             count = write_video(frames, folder / "video.mp4", world.rate_hz)
         truth = {"world": options.world, "message": options.message, "scheme_fingerprint": key.scheme.fingerprint}
         (folder / "truth.json").write_text(json.dumps(truth | {"seed": options.seed}, indent=2) + "\n")
-    sent = "no message" if options.message is None else f"message {options.message} from the start, again and again"
+    sent = "no message" if options.message is None else f"message {options.message} repeated from the start"
     print(f"{options.out}: {count} frames, {sent}")
     print(f"decode it with --tracker {TRACKERS[options.world]}")
     if options.key is None:
@@ -91,7 +91,7 @@ def _rollout(world: World, key: Key, options: FilmOptions) -> Rollout:
     return rollout
 
 
-def _frames(world: World, rollout: Rollout, options: FilmOptions) -> Iterator[Frame]:
+def _pictures(world: World, rollout: Rollout, options: FilmOptions) -> Iterator[Frame]:
     (shot,) = rollout.shots
     pictures = world.native_pictures(shot) if options.renderer == NATIVE else world.pictures(shot)
     for frame in pictures:

@@ -1,15 +1,14 @@
-"""`mtm-hil frames`: what framed messages withstand, on simulated log-likelihood ratios."""
+"""`mtm-hil frames`: framed messages under noise and attack, on simulated log-likelihood ratios."""
 
-import csv
 from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.messages.frames import Line, frame_cells, line_of, read_frames
+from hil.experiments.messages.frames import Row, frame_cells, read_frames, row_of
 from hil.experiments.runs.cells import CellStore
 from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
-from mtm_onboard.protocol.atomicfile import replacing
 
 _COLUMNS = (
     "what", "code", "check", "check_bits", "distance", "frames", "right", "wrong", "wrong_low", "wrong_high", "tries",
@@ -22,19 +21,16 @@ def frames(count: int, seed: int, workers: int | None, out: Path | None, cells: 
     plans = frame_cells(count, seed)
     with CellStore(cells) as store:
         run_sweep(read_frames, [cell for plan in plans for cell in plan], store, console, workers)
-        lines = [line_of(plan, run_sweep(read_frames, plan, store, console, 1)) for plan in plans]
+        lines = [row_of(plan, run_sweep(read_frames, plan, store, console, 1)) for plan in plans]
     for line in lines:
         print(_sentence(line))
     if out is not None:
-        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            file.write(f"# mtm-hil frames -n {count} --seed {seed} --out {out}\n")
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(_COLUMNS)
-            writer.writerows(_row(line) for line in lines)
+        command = f"mtm-hil frames -n {count} --seed {seed} --out {out}"
+        write_result_csv(out, command, _COLUMNS, map(_row, lines))
         print(f"wrote {out}")
 
 
-def _sentence(line: Line) -> str:
+def _sentence(line: Row) -> str:
     at = f", distance {line.distance:g}" if line.distance else ""
     return (
         f"{line.what}, {line.check} of {line.check_bits} bits, code {line.code}{at}: of {line.frames} frames "
@@ -42,7 +38,7 @@ def _sentence(line: Line) -> str:
     )
 
 
-def _row(line: Line) -> tuple[object, ...]:
+def _row(line: Row) -> tuple[object, ...]:
     low, high = clopper_pearson(line.wrong, line.frames)
     return (
         line.what, line.code, line.check, line.check_bits, line.distance, line.frames, line.right, line.wrong,

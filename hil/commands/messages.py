@@ -1,6 +1,5 @@
 """`mtm-hil messages`: how often whole framed messages are received."""
 
-import csv
 from pathlib import Path
 
 from rich.console import Console
@@ -8,8 +7,8 @@ from rich.console import Console
 from hil.experiments.messages.jobs import JOBS, payload_bps, receive
 from hil.experiments.runs.cells import Cell, CellStore
 from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
-from mtm_onboard.protocol.atomicfile import replacing
 
 _COLUMNS = ("job", "payload_bps", "rollouts", "received", "share", "low", "high", "wrong")
 # The first job has all rollouts, the others a part of them; long recordings take long.
@@ -34,9 +33,5 @@ def messages(rollouts: int, seed: int, workers: int | None, out: Path | None, ce
             shares = [f"{value:.5f}" for value in (received / count, low, high)]
             rows.append((name, f"{payload_bps(job):.4f}", count, received, *shares, wrong))
     if out is not None:
-        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            file.write(f"# mtm-hil messages -n {rollouts} --seed {seed} --out {out}\n")
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(_COLUMNS)
-            writer.writerows(rows)
+        write_result_csv(out, f"mtm-hil messages -n {rollouts} --seed {seed} --out {out}", _COLUMNS, rows)
         print(f"wrote {out}")

@@ -1,4 +1,4 @@
-"""Folders that appear whole or not at all."""
+"""New folders that appear complete or not at all."""
 
 import os
 import shutil

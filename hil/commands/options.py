@@ -1,16 +1,17 @@
-"""What the commands of `mtm-hil` share."""
+"""What the commands of `mtm-hil` share: their options, and how they end."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from mtm_audit.commands.errors import reported
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-CELLS_HELP = "Finished rollouts; a run that was interrupted goes on from there."
 
 
 class Renderer(StrEnum):
@@ -20,9 +21,33 @@ class Renderer(StrEnum):
     NATIVE = "native"
 
 
+# A recording: `record` and `film`.
+NewFolder = Annotated[Path, typer.Option(help="The folder to make; it must not exist.")]
+MessageNumber = Annotated[int | None, typer.Option(metavar="N", help="The message as a number.")]
+NoMessage = Annotated[bool, typer.Option("--no-message", help="Move without a message.")]
+KeyFile = Annotated[Path | None, typer.Option(help="The key file; one is made in the folder without it.")]
+WorldSeed = Annotated[int, typer.Option(min=0, help="Decides everything random but the message's waveforms.")]
+
+# An experiment.
+RendererName = Annotated[Renderer, typer.Option(help="Who draws the pictures: the software camera or the simulator.")]
+FirstSeed = Annotated[int, typer.Option(min=0, help="The first rollout's seed.")]
+CellSeed = Annotated[int, typer.Option(min=0, help="The first cell's seed.")]
+Workers = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")]
+OutCsv = Annotated[Path | None, typer.Option(help="A CSV file to write as well.")]
+Cells = Annotated[Path, typer.Option(help="File of finished rollouts, with which an interrupted run goes on.")]
+# Where each keeps its finished cells unless told otherwise.
+CELLS_FOLDER = Path("out/cells")
+
+
+def require_message_or_none(message: int | None, no_message: bool) -> None:
+    """Raise BadParameter unless exactly one of a message and none at all is asked for."""
+    if (message is None) != no_message:
+        raise typer.BadParameter("give either --message N or --no-message")
+
+
 @contextmanager
 def reported_console() -> Iterator["Console"]:
-    """A console for a command whose errors are told in one sentence, with the exit code they have."""
+    """Yield a console; an error in the block is printed in one sentence and ends the program with its exit code."""
     from rich.console import Console
 
     with reported("mtm-hil", "no half-written result is left"):

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from hil.experiments.detectors.paper_robomaster import measure, rich_table, write_csv
 from hil.experiments.runs.cells import CellStore
-from hil.experiments.worlds import conduct as world_conduct
+from hil.experiments.worlds import performance as world_performance
 from hil.experiments.worlds import report as world_report
 from hil.experiments.worlds.tables import Condition, Effort, Row, conditions_of, null_conditions_of
 from hil.experiments.worlds.tables import measure as measure_world
@@ -60,8 +60,7 @@ def paper_robomaster(rollouts: int, out: Path | None, cells: Path, console: Cons
         rows = measure(plant, rollouts, store, console)
     console.print(rich_table(rows))
     if out is not None:
-        command = f"mtm-hil paper robomaster -n {rollouts} --out {out}"
-        write_csv(out, rows, (command, f"{plant}"))
+        write_csv(out, rows, f"mtm-hil paper robomaster -n {rollouts} --out {out}", (f"{plant}",))
         print(f"wrote {out}")
 
 
@@ -84,7 +83,7 @@ def paper_world(world: str, options: WorldOptions, console: Console) -> None:
     print(summary)
     if options.out is not None:
         took = f"its cells took {seconds / 60:.0f} minutes of one core"
-        world_report.write_csv(options.out, rows, (options.command(world), took, summary, *world_report.remarks(world)))
+        world_report.write_csv(options.out, rows, options.command(world), (took, summary, *world_report.remarks(world)))
         print(f"wrote {options.out}")
 
 
@@ -113,7 +112,7 @@ def paper_null(options: WorldOptions, console: Console) -> None:
             tables.append((world, rows))
             console.print(world_report.rich_table(world, rows))
     if options.out is not None:
-        world_report.write_null_csv(options.out, tables, (options.command("null"),))
+        world_report.write_null_csv(options.out, tables, options.command("null"))
         print(f"wrote {options.out}")
 
 
@@ -122,10 +121,10 @@ def paper_performance(options: WorldOptions, console: Console) -> None:
     _check_simulators()
     rollouts = _QUICK_ROLLOUTS if options.quick else options.rollouts
     with CellStore(options.cells) as store:
-        rows = world_conduct.measure(NAMES, rollouts, options.first_seed, store, console, options.workers)
-    console.print(world_conduct.rich_table(rows))
+        rows = world_performance.measure(NAMES, rollouts, options.first_seed, store, console, options.workers)
+    console.print(world_performance.rich_table(rows))
     if options.out is not None:
-        world_conduct.write_csv(options.out, rows, (options.command("performance"),))
+        world_performance.write_csv(options.out, rows, options.command("performance"))
         print(f"wrote {options.out}")
 
 

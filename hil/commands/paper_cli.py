@@ -5,7 +5,16 @@ from typing import Annotated
 
 import typer
 
-from hil.commands.options import CELLS_HELP, Renderer, reported_console
+from hil.commands.options import (
+    CELLS_FOLDER,
+    Cells,
+    FirstSeed,
+    OutCsv,
+    Renderer,
+    RendererName,
+    Workers,
+    reported_console,
+)
 
 paper = typer.Typer(help="The paper's tables, measured on the simulated robots.", no_args_is_help=True)
 
@@ -14,8 +23,8 @@ paper = typer.Typer(help="The paper's tables, measured on the simulated robots."
 def paper_robomaster(
     rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each row of the table.")] = 40,
     quick: Annotated[bool, typer.Option("--quick", help="Five rollouts, for a first look.")] = False,
-    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well.")] = None,
-    cells: Annotated[Path, typer.Option(help=CELLS_HELP)] = Path("out/cells/robomaster.jsonl"),
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "robomaster.jsonl",
 ) -> None:
     """Accuracy and margin over the window length, with a wrong key and without a message, beside the paper's."""
     with reported_console() as console:
@@ -29,21 +38,17 @@ _Rollouts = Annotated[
     typer.Option("-n", min=1, help="Rollouts at the headline's scheme, Football 64 for each ten; others take a part."),
 ]
 _Quick = Annotated[bool, typer.Option("--quick", help="One rollout of a few points, for a first look.")]
-_Seed = Annotated[int, typer.Option(min=0, help="The first rollout's seed.")]
-_Renderer = Annotated[Renderer, typer.Option(help="Who draws the pictures: the software camera or the simulator.")]
-_Workers = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")]
-_Cells = Annotated[Path, typer.Option(help=CELLS_HELP)]
 
 
 def _paper_worlds(
     context: typer.Context,
     rollouts: _Rollouts = 50,
     quick: _Quick = False,
-    seed: _Seed = 10_000,
-    renderer: _Renderer = Renderer.SOFTWARE,
-    workers: _Workers = None,
+    seed: FirstSeed = 10_000,
+    renderer: RendererName = Renderer.SOFTWARE,
+    workers: Workers = None,
     out: Annotated[Path | None, typer.Option(help="A CSV file to write as well; a folder for all.")] = None,
-    cells: _Cells = Path("out/cells/worlds.jsonl"),
+    cells: Cells = CELLS_FOLDER / "worlds.jsonl",
 ) -> None:
     with reported_console() as console:
         from hil.commands.paper import WorldOptions, paper_table

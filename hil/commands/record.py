@@ -67,12 +67,12 @@ def record(options: RecordOptions, console: Console) -> None:
         with Progress(console=console, transient=True, disable=not (frames and console.is_terminal)) as progress:
             task = progress.add_task("filming", total=frames)
             write_recording(folder, settings, result, sensors, lambda done: progress.update(task, completed=done))
-    _say_what_was_recorded(options, settings)
+    _print_summary(options, settings)
     if options.realtime:
         console.print(_robots_table(result.robots))
 
 
-def _say_what_was_recorded(options: RecordOptions, settings: RunSettings) -> None:
+def _print_summary(options: RecordOptions, settings: RunSettings) -> None:
     sent = "no message" if options.message is None else f"message {options.message}, from {settings.onset_s:.4g} s on"
     print(f"{options.out}: {options.seconds:g} s of motion, {sent}")
     scheme = settings.key.scheme

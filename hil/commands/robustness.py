@@ -1,6 +1,5 @@
-"""`mtm-hil robustness`: the matched detector under views, frames and clocks that nobody calibrated."""
+"""`mtm-hil robustness`: the matched detector under uncalibrated cameras, frame times and clocks."""
 
-import csv
 from dataclasses import asdict
 from pathlib import Path
 
@@ -9,8 +8,12 @@ from rich.console import Console
 from hil.experiments.detectors.robustness import CONDITIONS, JOBS, read_under
 from hil.experiments.runs.cells import Cell, CellStore
 from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
-from mtm_onboard.protocol.atomicfile import replacing
+
+_COLUMNS = (
+    "alphabet_size", "ticks", "windows", "condition", "rollouts", "symbols", "right", "accuracy", "low", "high",
+)  # fmt: skip
 
 
 def robustness(rollouts: int, seed: int, workers: int | None, out: Path | None, cells: Path, console: Console) -> None:
@@ -29,10 +32,5 @@ def robustness(rollouts: int, seed: int, workers: int | None, out: Path | None, 
                 accuracy = [f"{value:.5f}" for value in (right / read, low, high)]
                 rows.append((job.alphabet_size, job.ticks, job.windows, name, rollouts, read, right, *accuracy))
     if out is not None:
-        with replacing(out) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            file.write(f"# mtm-hil robustness -n {rollouts} --seed {seed} --out {out}\n")
-            writer = csv.writer(file, lineterminator="\n")
-            job_columns = ("alphabet_size", "ticks", "windows")
-            writer.writerow((*job_columns, "condition", "rollouts", "symbols", "right", "accuracy", "low", "high"))
-            writer.writerows(rows)
+        write_result_csv(out, f"mtm-hil robustness -n {rollouts} --seed {seed} --out {out}", _COLUMNS, rows)
         print(f"wrote {out}")

@@ -4,16 +4,16 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.detectors.paper_robomaster import Proportion
 from hil.experiments.hardening.shim import JOB, compare, write_csv
 from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.proportion import Proportion
 from hil.plants.mecanum import calibrated_parameters
 from hil.vehicles.shim_library import load_shim
 
 
 def shim(rollouts: int, out: Path | None, cells: Path, console: Console) -> None:
     """Run, print and, where asked, write the comparison."""
-    load_shim()  # Where no compiler is, better to hear it before the work.
+    load_shim()  # Fails at once where there is no compiler.
     plant = calibrated_parameters()
     with CellStore(cells) as store:
         found = compare(rollouts, plant, store, console)
@@ -24,7 +24,7 @@ def shim(rollouts: int, out: Path | None, cells: Path, console: Console) -> None
     print(f"played by the C shim:   {_share(found.shim)}")
     print(f"same symbols from both: {_share(found.same)}; {apart}")
     if out is not None:
-        write_csv(out, found, (f"mtm-hil shim -n {rollouts} --out {out}", f"{plant}", apart))
+        write_csv(out, found, f"mtm-hil shim -n {rollouts} --out {out}", (f"{plant}", apart))
         print(f"wrote {out}")
 
 

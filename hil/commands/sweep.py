@@ -5,8 +5,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hil.experiments.detectors.accuracy_table import Sweep, grid, measure, world_of
 from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.result_file import provenance
+from hil.experiments.worlds.accuracy_table import Sweep, grid, measure, world_of
 from mtm_audit.planning.table import write_table
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.schemefile import load_scheme
@@ -52,16 +53,16 @@ def sweep(options: SweepOptions, console: Console) -> None:
     asked = Sweep(options.world, schemes, options.detector, options.rollouts, options.first_seed)
     with CellStore(options.cells) as store:
         table, messages = measure(asked, store, console, options.workers)
-    comments = [_command(options)]
+    notes = []
     if options.scheme is not None:
         (whole,) = messages
         low, high = whole.interval_percent
-        comments.append(
+        notes.append(
             f"whole messages right: {whole.successes} of {whole.trials}, {whole.percent:.1f} % "
             f"[{low:.1f}-{high:.1f}]"
         )  # fmt: skip
-        print(comments[-1])
-    write_table(options.out, table, comments)
+        print(notes[-1])
+    write_table(options.out, table, provenance(_command(options), notes))
     print(f"wrote {options.out}: {len(table.points)} points of {len(table.channels)} channels, alone and pooled")
 
 

@@ -1,4 +1,4 @@
-"""Simulated time: a clock that runs whatever is due while somebody sleeps on it."""
+"""Simulated time: a clock that runs the callbacks that are due while a caller sleeps."""
 
 import heapq
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""A transport without a wire: commands reach the motion controller as they would look after one."""
+"""A transport without a wire: commands reach the motion controller rounded as a CAN message rounds them."""
 
 from hil.vehicles.motion_controller import MotionController
 from mtm_onboard.links.base import Transport

@@ -39,16 +39,16 @@ _SETTLING_S = 0.05
 
 @dataclass(frozen=True)
 class _Link:
-    """The wire to one robot: its transport, what its far end does each period, what it found wrong, and its end.
+    """The wire to one robot: our transport, the robot's periodic `poll`, the count of `faults`, and `shutdown`.
 
-    `lets_go` says whether a stop over this wire switches the motors off as well.
+    `stop_releases_motors` says whether a stop over this wire switches the motors off as well.
     """
 
     transport: Transport
     poll: Callable[[float], None]
     faults: Callable[[], int]
     shutdown: Callable[[], None]
-    lets_go: bool = True
+    stop_releases_motors: bool = True
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class _Robot:
 
     def report(self, stats: LoopStats) -> RobotReport:
         guard, controller = self.guard, self.controller
-        is_stopped = controller.demand == STOP and not (self.link.lets_go and controller.work_mode)
+        is_stopped = controller.demand == STOP and not (self.link.stop_releases_motors and controller.work_mode)
         return RobotReport(
             self.name, stats.sent, stats.missed, guard.clamped, guard.stale, guard.refused, self.link.faults(),
             controller.deadman_stops, is_stopped,
@@ -77,11 +77,11 @@ class _Robot:
 
 
 def run_lockstep(settings: RunSettings) -> RunResult:
-    """Run the world and return its motion.
+    """The motion of a run of the world.
 
     The same settings give the same result, bit for bit, over CAN and without a wire. In plaintext commands are rounded
-    to 0.1 mm/s and 0.001 deg/s; over MAVLink the first one waits until the vehicle was heard. Raises MtmError when a
-    robot's link fails.
+    to 0.1 mm/s and 0.001 deg/s; over MAVLink the first one waits for the vehicle's first message. Raises MtmError when
+    a robot's link fails.
     """
     clock = SimulatedClock()
     with ExitStack() as wires:
@@ -209,7 +209,7 @@ def _mavlink_link(vehicle: MavlinkVehicle, ours: PipeEnd, clock: SimulatedClock)
         wrong = sum(int(health[name]) for name in ("refusals", "alarms", "link_errors", "bad_frames", "malformed"))
         return wrong + vehicle.refused_frames + vehicle.ignored_setpoints + vehicle.controller.faults
 
-    return _Link(transport, vehicle.poll, faults, lambda: None, lets_go=False)
+    return _Link(transport, vehicle.poll, faults, lambda: None, stop_releases_motors=False)
 
 
 def _direct_link(controller: MotionController, clock: SimulatedClock) -> _Link:

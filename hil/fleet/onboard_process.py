@@ -13,7 +13,7 @@ from mtm_onboard.model.velocity import STOP
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.journal_file import CLAMPED, REFUSED, STALE, JournalRecord, read_journal
 
-_PATIENCE_S = 5.0
+_TERMINATION_TIMEOUT_S = 5.0
 
 _CONFIG = """\
 [robot]
@@ -53,7 +53,7 @@ class OnboardProcess:
         )  # fmt: skip
         (folder / f"{name}.toml").write_text(config, encoding="utf-8")
         with (folder / f"{name}.log").open("wb") as log:
-            # In a session of its own a terminal's interrupt reaches it through `end` alone.
+            # In a session of its own, so that a terminal's interrupt reaches it only through `end`.
             self._process = subprocess.Popen(
                 [program("mtm-onboard"), "run", "--config", f"{name}.toml", *arguments],
                 cwd=folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True,
@@ -65,24 +65,24 @@ class OnboardProcess:
         return self._process.poll() is None
 
     def check(self, *, may_have_ended: bool) -> None:
-        """Raise MtmError when it has ended with an error, or at all although it may not have."""
+        """Raise MtmError when it has ended with an error, or has ended before it may."""
         code = self._process.poll()
         if code or (code == 0 and not may_have_ended):
             words = (self._folder / f"{self.name}.log").read_text(encoding="utf-8", errors="replace").strip()
-            raise MtmError(f"mtm-onboard of {self.name} ended with code {code} ({words[-300:] or 'it said nothing'})")
+            raise MtmError(f"mtm-onboard of {self.name} ended with code {code} ({words[-300:] or 'no output'})")
 
     def end(self) -> None:
         """Ask it to stop the robot and end, and end it when it does not."""
         if self.is_running:
             self._process.terminate()
             try:
-                self._process.wait(_PATIENCE_S)
+                self._process.wait(_TERMINATION_TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 self._process.kill()
         self._process.wait()
 
     def report(self) -> RobotReport:
-        """What its journal and the robot's end of the wire tell, after it has ended.
+        """The robot's report from its journal and the robot's end of the wire, after the program has ended.
 
         Raises MtmError when the journal lacks rows or shows a tick that was sent twice.
         """
@@ -91,7 +91,7 @@ class OnboardProcess:
         flags, controller = journal.flags, self._wire.controller
         clamped, stale, refused = (int(np.count_nonzero(flags & bit)) for bit in (CLAMPED, STALE, REFUSED))
         median_s, late_s = np.quantile(journal.lateness_s, (0.5, 0.99))
-        is_stopped = controller.demand == STOP and not (self._wire.lets_go and controller.work_mode)
+        is_stopped = controller.demand == STOP and not (self._wire.stop_releases_motors and controller.work_mode)
         return RobotReport(
             self.name, sent, missed, clamped, stale, refused, self._wire.faults(),
             controller.deadman_stops, is_stopped, (float(median_s), float(late_s)),

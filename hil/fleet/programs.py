@@ -1,12 +1,12 @@
-"""The project's own programs, as a user would call them."""
+"""The project's installed programs, and the environment to run several of them at once."""
 
 import sysconfig
 from pathlib import Path
 
 from mtm_onboard.protocol import MtmError
 
-# Numerical libraries read these when they are loaded. Where several processes compute at once, more threads than
-# cores only get in each other's way.
+# Numerical libraries read these when they are loaded. Several computing processes with more threads than there are
+# cores slow each other down.
 SINGLE_THREADED = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 

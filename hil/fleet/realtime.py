@@ -25,14 +25,14 @@ from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.runtime.client import BaseCommandClient
 from mtm_onboard.runtime.loop import run_loop
 
-# Four interpreters have to start before the message does.
+# Time for four interpreters to start before the message does.
 START_S = 4.0
 
 _POLLS_PER_COMMAND = 2
 _POLLS_PER_CHECK = 100
-_FAREWELL_S = 3.0
-# The programs' clock and this one's may differ by the steps of the system's time.
-_EARLY_S = 0.5
+_SHUTDOWN_TIMEOUT_S = 3.0
+# The programs' clock and this one may differ by adjustments of the system's time.
+_CLOCK_TOLERANCE_S = 0.5
 
 
 @dataclass
@@ -111,12 +111,14 @@ def _drive(
                 robot.command()
         if tick // _POLLS_PER_CHECK > last // _POLLS_PER_CHECK:
             for robot in robots:
-                robot.process.check(may_have_ended=since_s > settings.seconds - _EARLY_S)
+                robot.process.check(may_have_ended=since_s > settings.seconds - _CLOCK_TOLERANCE_S)
         last = tick
 
     def ended() -> bool:
         after_s = clock.now() - began_s - settings.seconds
-        return after_s > _FAREWELL_S or (after_s > 0.0 and not any(robot.process.is_running for robot in robots))
+        return after_s > _SHUTDOWN_TIMEOUT_S or (
+            after_s > 0.0 and not any(robot.process.is_running for robot in robots)
+        )
 
     run_loop(clock, 1.0 / SAMPLE_PERIOD_S, step, start_s=began_s, stop=ended)
     return poses, times_s

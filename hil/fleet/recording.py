@@ -1,4 +1,4 @@
-"""What the sensors make of a run, and what belongs beside it: a folder that an auditor can be given.
+"""The recording of a run: a folder that an auditor can be given, and the truth beside it.
 
 mocap/<robot>.tum   motion capture
 video.mp4           the camera's film, unless none was wanted
@@ -44,7 +44,7 @@ def write_recording(
     sensors: Sensors,
     filmed: Callable[[int], None] | None = None,
 ) -> None:
-    """Write the recording of a run into `folder`, which exists; `filmed` hears the number of frames done."""
+    """Write the recording of a run into `folder`, which exists; `filmed` is called with the number of frames done."""
     mocap = folder / "mocap"
     mocap.mkdir()
     write_tum_files(motion_capture_tracks(result, settings.seed, sensors.motion_capture), mocap)

@@ -1,4 +1,4 @@
-"""One run of the RoboMaster world: what is set, and what comes out of it.
+"""One run of the RoboMaster world: its settings and its result.
 
 One integer seed decides everything random about a run except its waveforms, which come from the key alone.
 """
@@ -113,7 +113,7 @@ def seeds_of(seed: int) -> Seeds:
 
 @dataclass(frozen=True)
 class RobotReport:
-    """How one robot fared, in ticks unless it says otherwise; `faults` is what either end of its link found wrong.
+    """Counts of one robot, in ticks unless noted; `faults` counts what either end of its link found wrong.
 
     `late_s` are the median and the 99th percentile of how late its ticks began, zero in simulated time.
     """
@@ -131,7 +131,7 @@ class RobotReport:
 
     @property
     def is_clean(self) -> bool:
-        """Whether nothing went wrong and the motors were off after the run; missing or clamping is no fault."""
+        """Whether there was no fault and the motors were off after the run; missed and clamped ticks are no faults."""
         return self.is_stopped and not (self.stale or self.refused or self.faults or self.deadman_stops)
 
 

@@ -1,4 +1,4 @@
-"""Simulated robots that a program in another process takes for real: behind pseudo-terminals and UDP ports."""
+"""Simulated robots behind pseudo-terminals and UDP ports, for programs in other processes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,9 +16,9 @@ from mtm_onboard.links.mavlink_ports import UdpPort
 
 @dataclass(frozen=True)
 class SerialWire:
-    """One robot: the TOML fields of [transport] that reach it, what it does each period, and what it found wrong.
+    """One robot: the TOML fields of [transport] that reach it, its periodic `poll`, and the count of `faults`.
 
-    `lets_go` says whether a stop over this wire switches the motors off as well.
+    `stop_releases_motors` says whether a stop over this wire switches the motors off as well.
     """
 
     transport: str
@@ -26,7 +26,7 @@ class SerialWire:
     poll: Callable[[float], None]
     faults: Callable[[], int]
     shutdown: Callable[[], None]
-    lets_go: bool = True
+    stop_releases_motors: bool = True
 
 
 def serial_wire(wire: Wire, plant: Plant) -> SerialWire:
@@ -63,4 +63,4 @@ def _autopilot(plant: Plant) -> SerialWire:
         return vehicle.refused_frames + vehicle.ignored_setpoints + vehicle.port_errors + vehicle.controller.faults
 
     transport = f'kind = "mavlink"\nprofile = "copter"\nendpoint = "udpout:127.0.0.1:{port.number}"'
-    return SerialWire(transport, vehicle.controller, vehicle.poll, faults, port.close, lets_go=False)
+    return SerialWire(transport, vehicle.controller, vehicle.poll, faults, port.close, stop_releases_motors=False)

@@ -1,1 +1,1 @@
-"""Physics without wires: how simulated robots follow the velocities that they are commanded."""
+"""Physics without wires: how simulated robots follow commanded velocities."""

@@ -1,1 +1,1 @@
-"""What sees the robots: a software camera and a motion-capture system."""
+"""The sensors of the auditor: a software camera and a motion-capture system."""

@@ -1,4 +1,4 @@
-"""What the world hands to the sensors: where each robot was, and when something stood in the way."""
+"""The input of the sensors: each robot's trajectory, and the times when it is occluded."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What floor and robots look like from above, drawn once at a fixed resolution."""
+"""Textures of the floor and of robots from above, drawn once at a fixed resolution."""
 
 import cv2
 import numpy as np

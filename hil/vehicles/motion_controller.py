@@ -4,7 +4,7 @@ from typing import Protocol
 
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 
-DEADMAN_S = 0.2  # What the Cambridge RoboMaster's ROS bridge waits; DJI publishes no figure for the firmware.
+DEADMAN_S = 0.2  # That of the Cambridge RoboMaster's ROS bridge; DJI publishes no figure for the firmware.
 
 
 class Plant(Protocol):
@@ -40,7 +40,7 @@ class MotionController:
     Commands are kept when they arrive and reach the plant at the next `advance`, as in a firmware loop. So the motion
     depends on the instants of `advance` alone, and not on the link a command took to get here.
 
-    With `deadman_s` None the last command is kept for ever, which is the worst a real controller could do.
+    With `deadman_s` None the last command is kept for ever, the worst case.
     """
 
     def __init__(self, plant: Plant, deadman_s: float | None = DEADMAN_S) -> None:

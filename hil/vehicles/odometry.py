@@ -1,4 +1,4 @@
-"""What a robot makes of its own motion: its pose from where it was switched on."""
+"""A robot's odometry: its pose relative to where it was switched on."""
 
 import math
 

@@ -1,7 +1,7 @@
-"""Wires that go wrong in simulated time: a CAN bus, a line of text and a MAVLink port with the same faults.
+"""Faulty wires in simulated time: a CAN bus, a line of text and a MAVLink port with the same kinds of faults.
 
-What a wire carries are units: frames on the CAN bus, commands and answers ended by a semicolon, frames of MAVLink. Each
-direction has the faults of its own accord.
+A wire carries units: CAN frames, texts that end with a semicolon, MAVLink frames. The faults of the two directions are
+independent.
 """
 
 import errno
@@ -17,14 +17,17 @@ from mtm_onboard.links.robomaster_messages import FROM_COMPANION_ID, FROM_MOTION
 from mtm_onboard.model.clock import Clock
 from mtm_onboard.protocol import MtmError
 
-_MOST_BYTES_CHANGED = 3
+_MAX_BYTES_CHANGED = 3
 
 
 @dataclass(frozen=True)
 class WireFaults:
-    """Chances of one unit to be lost, sent twice, changed in up to three bytes, or overtaken by the next; how long
-    units take (least and most, in order); and how long in each `block_every_s` the wire takes nothing.
-    """  # fmt: skip
+    """Faults of one direction.
+
+    `drop`, `duplicate`, `corrupt` (up to three bytes changed) and `reorder` (overtaken by the next unit) are
+    probabilities for each unit. `delay_s` bounds a unit's delay, which keeps the order. For `block_s` in each
+    `block_every_s` the wire accepts nothing.
+    """
 
     drop: float = 0.0
     duplicate: float = 0.0
@@ -32,20 +35,20 @@ class WireFaults:
     reorder: float = 0.0
     delay_s: tuple[float, float] = (0.0, 0.0)
     block_s: float = 0.0
-    block_every_s: float = 0.47  # in step with no tick and no trial to open a link
+    block_every_s: float = 0.47  # no multiple of a tick or of the time between attempts to open a link
 
 
 class Direction:
-    """One way through a wire: units go in by `put` and come out by `take` when they are due."""
+    """One direction of a wire: units go in by `put` and come out by `take` when they are due."""
 
     def __init__(self, wire: "FaultyWire", draw: random.Random) -> None:
         self._wire = wire
         self._draw = draw
-        self._under_way: deque[tuple[float, bytes]] = deque()
+        self._in_transit: deque[tuple[float, bytes]] = deque()
         self._overtaken: bytes | None = None
 
     def put(self, unit: bytes) -> None:
-        """Have a unit set out; what a wire that swallows is given never arrives."""
+        """Send a unit; it never arrives while the wire swallows."""
         wire, draw = self._wire, self._draw
         if wire.swallows:
             return
@@ -66,27 +69,27 @@ class Direction:
 
     def take(self) -> bytes | None:
         """The next unit that has arrived."""
-        if self._under_way and self._under_way[0][0] <= self._wire.clock.now() + 1e-9:
-            return self._under_way.popleft()[1]
+        if self._in_transit and self._in_transit[0][0] <= self._wire.clock.now() + 1e-9:
+            return self._in_transit.popleft()[1]
         return None
 
     def clear(self) -> None:
-        """Lose all that is under way."""
-        self._under_way.clear()
+        """Lose all units in transit."""
+        self._in_transit.clear()
         self._overtaken = None
 
     def _send(self, unit: bytes) -> None:
         due_s = self._wire.clock.now() + self._draw.uniform(*self._wire.faults.delay_s)
-        if self._under_way:
-            due_s = max(due_s, self._under_way[-1][0])
-        self._under_way.append((due_s, unit))
+        if self._in_transit:
+            due_s = max(due_s, self._in_transit[-1][0])
+        self._in_transit.append((due_s, unit))
 
 
 class FaultyWire:
     """Both directions, with `faults` that may be changed at any time.
 
-    `cut` loses what is under way and has every write fail until `mend`; a wire that `swallows` takes everything,
-    and nothing arrives.
+    `cut` loses what is in transit and makes every write fail until `restore`; a wire that `swallows` accepts everything
+    and delivers nothing.
     """
 
     def __init__(self, clock: Clock, seed: int) -> None:
@@ -103,13 +106,13 @@ class FaultyWire:
         self.to_robot.clear()
         self.from_robot.clear()
 
-    def mend(self) -> None:
-        """Plug it in again, and end the swallowing."""
+    def restore(self) -> None:
+        """Plug it in again, and deliver again."""
         self.is_cut = self.swallows = False
 
     @property
     def is_blocked(self) -> bool:
-        """Whether the wire takes nothing from our end just now."""
+        """Whether the wire accepts nothing from our end at this time."""
         faults = self.faults
         return faults.block_s > 0.0 and self.clock.now() % faults.block_every_s < faults.block_s
 
@@ -144,7 +147,7 @@ class FaultyBus:
         return can.Message(arbitration_id=self._receive_id, is_extended_id=False, data=data)
 
     def shutdown(self) -> None:
-        """The next node in this place uses the same wire."""
+        """Nothing: the next node uses the same wire."""
 
     def _check(self) -> None:
         if self._wire.is_cut:
@@ -170,11 +173,11 @@ class FaultyText(ByteLink):
         return _all_of(self._wire.from_robot)
 
     def close(self) -> None:
-        """The next link uses the same wire."""
+        """Nothing: the next link uses the same wire."""
 
 
 class FaultyTextPort:
-    """The robot's end of a line of text, which does not know whether anybody is at the other one."""
+    """The robot's end of a line of text, which cannot tell whether the other end is connected."""
 
     def __init__(self, wire: FaultyWire) -> None:
         self._wire = wire
@@ -216,10 +219,10 @@ class FaultyPort:
         return self._in.take() or b""
 
     def keep_sender(self) -> None:
-        """There is one other end."""
+        """Nothing: there is one other end."""
 
     def close(self) -> None:
-        """What is not read by now goes to nobody."""
+        """Discard what was not read."""
         if not self._is_robot:
             self._in.clear()
 
@@ -240,7 +243,7 @@ def _all_of(direction: Direction) -> bytes:
 
 def _corrupted(draw: random.Random, unit: bytes) -> bytes:
     changed = bytearray(unit)
-    for _ in range(draw.randint(1, _MOST_BYTES_CHANGED)):
+    for _ in range(draw.randint(1, _MAX_BYTES_CHANGED)):
         if changed:
             changed[draw.randrange(len(changed))] ^= draw.randint(1, 255)
     return bytes(changed)

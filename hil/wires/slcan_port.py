@@ -1,6 +1,6 @@
-"""A serial CAN adapter that is none: LAWICEL's ASCII protocol on a pseudo-terminal.
+"""A simulated serial CAN adapter: LAWICEL's ASCII protocol on a pseudo-terminal.
 
-A program in another process opens `path` as python-can's `slcan` interface and meets a simulated robot there. The
+A program in another process opens `path` as python-can's `slcan` interface and finds a simulated robot there. The
 protocol is that of the LAWICEL CANUSB manual: lines end in a carriage return, each is answered with a carriage
 return when done and with a bell when refused.
 """
@@ -15,7 +15,7 @@ import can
 _LINE_END = b"\r"
 _BELL = b"\a"
 _LONGEST_LINE = 26  # T, 8 digits of id, 1 of length, 16 of data
-_MOST_UNSENT_BYTES = 16_384  # an adapter's memory; frames beyond it are lost, as on a real one
+_MAX_UNSENT_BYTES = 16_384  # an adapter's memory; frames beyond it are lost, as on a real one
 _FRAME = re.compile(rb"(?:t([0-7][0-9A-Fa-f]{2})|T([01][0-9A-Fa-f]{7}))([0-8])((?:[0-9A-Fa-f]{2})*)")
 _SETTING = re.compile(rb"S[0-8]|s[0-9A-Fa-f]{4}")
 
@@ -51,7 +51,7 @@ class SlcanPort:
         """Pass a frame to the other side; lost when the channel is closed or nobody reads. Never waits."""
         if not self._is_open:
             return
-        if len(self._unsent) > _MOST_UNSENT_BYTES:
+        if len(self._unsent) > _MAX_UNSENT_BYTES:
             self.lost_frames += 1
         else:
             head = f"T{msg.arbitration_id:08X}" if msg.is_extended_id else f"t{msg.arbitration_id:03X}"

@@ -1,1 +1,1 @@
-"""Plants with their task controllers."""
+"""The paper's five systems with their task controllers, and what draws the simulated ones."""

@@ -1,5 +1,7 @@
 """VMAS's Discovery with one agent: it visits one goal after the other under a scripted navigation controller.
 
+See the paper's appendices "Policy and Controller Details" and "Discovery: Numerical Results".
+
 The scenario's physics are VMAS's own: a unit mass under a force, and drag that takes off a quarter of its velocity
 every tick. A velocity command becomes the force under which the agent settles to that velocity, so that it follows
 its command with a lag of a few ticks.
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.worlds.discovery_pictures import AGENT_COLOUR, PICTURE_PX, draw, draw_natively
-from hil.worlds.world import Conduct, Integers, Rollout, Shot
+from hil.worlds.world import ControlHistory, Integers, Rollout, Shot
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.track import Floats
 from mtm_audit.tracking.registry import Tracker
@@ -59,25 +61,25 @@ class Discovery:
     picture_px = PICTURE_PX
 
     def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
-        """Pursue the goals in one shot each; raises MtmError when the arrays disagree or a goal does not exist."""
+        """One rollout of one shot for each seed; raises MtmError when the arrays disagree or a goal does not exist."""
         _check(goals, noise, seeds, self.choices)
         starts_m = np.array([_start(np.random.default_rng(seed)) for seed in seeds])
         ticks = noise.shape[2]
         pursued_m = np.repeat(GOAL_LOCATIONS_M[goals], ticks, axis=1)
-        positions_m, conducts = _drive(starts_m, pursued_m, noise.reshape(len(seeds), -1, 2))
+        positions_m, histories = _drive(starts_m, pursued_m, noise.reshape(len(seeds), -1, 2))
         times_s = np.arange(positions_m.shape[1]) / RATE_HZ
         return [
-            Rollout((Shot(0, times_s, own_m),), conduct) for own_m, conduct in zip(positions_m, conducts, strict=True)
+            Rollout((Shot(0, times_s, own_m),), control) for own_m, control in zip(positions_m, histories, strict=True)
         ]
 
-    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[Conduct]:
-        """Drive to one goal, which the seed decides; the score is the distance that is left in the end."""
+    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[ControlHistory]:
+        """Commands of a drive to one goal of the seed; the score is the remaining distance at its end."""
         generators = [np.random.default_rng(seed) for seed in seeds]
         starts_m = np.array([_start(generator) for generator in generators])
         goals = np.array([[generator.integers(self.choices)] for generator in generators])
         _check(goals, noise[:, None], seeds, self.choices)
-        _, conducts = _drive(starts_m, np.repeat(GOAL_LOCATIONS_M[goals], noise.shape[1], axis=1), noise)
-        return conducts
+        _, histories = _drive(starts_m, np.repeat(GOAL_LOCATIONS_M[goals], noise.shape[1], axis=1), noise)
+        return histories
 
     def pictures(self, shot: Shot) -> Iterator[Frame]:
         """Drawn as VMAS's viewer draws the scenario by default, with the rays of the agent's lidar."""
@@ -114,8 +116,8 @@ def _start(generator: np.random.Generator) -> Floats:
             return np.asarray(start_m)
 
 
-def _drive(starts_m: Floats, goals_m: Floats, noise: Floats) -> tuple[Floats, list[Conduct]]:
-    """Positions (rollouts, ticks + 1, 2) and conducts of one batch; `goals_m` and `noise` are (rollouts, ticks, 2)."""
+def _drive(starts_m: Floats, goals_m: Floats, noise: Floats) -> tuple[Floats, list[ControlHistory]]:
+    """Positions (rollouts, ticks + 1, 2) and histories of one batch; `goals_m` and `noise` are (rollouts, ticks, 2)."""
     import torch
 
     env = _environment(len(starts_m))
@@ -135,7 +137,8 @@ def _drive(starts_m: Floats, goals_m: Floats, noise: Floats) -> tuple[Floats, li
     asked = base + noise
     left_m = np.linalg.norm(track_m[:, -1] - goals_m[:, -1], axis=1)
     return track_m, [
-        Conduct(base[row], asked[row], sent[row], {FINAL_DISTANCE: float(left_m[row])}) for row in range(len(noise))
+        ControlHistory(base[row], asked[row], sent[row], {FINAL_DISTANCE: float(left_m[row])})
+        for row in range(len(noise))
     ]
 
 

@@ -1,5 +1,7 @@
 """VMAS's Football, three against three: a team that plays by rules against the simulator's own opponents.
 
+See the paper's appendices "Policy and Controller Details" and "Football: Numerical Results".
+
 The scenario's physics and pitch are VMAS's defaults: agents of a unit mass under forces of up to 0.1 N and no faster
 than 0.15 m/s, kick-offs at random places of either half. So are its opponents, but for their strength, which the paper
 does not state.
@@ -11,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hil.worlds.football_pictures import PICTURE_PX, draw, draw_natively
-from hil.worlds.football_team import GOAL_XY_M, STRATEGIES, Sight, Team, strategies
-from hil.worlds.world import Conduct, Integers, Rollout, Shot
+from hil.worlds.football_team import GOAL_XY_M, STRATEGIES, GameState, Team, strategies
+from hil.worlds.world import ControlHistory, Integers, Rollout, Shot
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.track import Floats
 from mtm_audit.tracking.registry import Tracker
@@ -34,9 +36,9 @@ SCORED = "scored"
 class Football:
     """The world Football.
 
-    All rollouts of a call are one batch. VMAS draws kick-off places and the opponents' ideas from one stream of random
-    numbers for the batch, which starts from all seeds of the call: the same call gives the same rollouts, but a seed
-    among other seeds gives another game.
+    All rollouts of a call are one batch. VMAS draws kick-off places and the opponents' decisions from one stream of
+    random numbers for the batch, which is seeded with all seeds of the call: the same call gives the same rollouts, but
+    one seed gives another game when it is called together with other seeds.
     """
 
     name = "football"
@@ -48,17 +50,17 @@ class Football:
     picture_px = PICTURE_PX
 
     def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
-        """Play by one strategy after the other, in one shot with all kick-offs in it.
+        """One rollout of one shot for each seed, which plays one strategy after the other, kick-offs included.
 
         Raises MtmError when the arrays disagree or a strategy does not exist.
         """
         _check(goals, noise, seeds)
-        states, conducts = _play(np.repeat(goals, noise.shape[2], axis=1), noise.reshape(len(seeds), -1, 6), seeds)
+        states, histories = _play(np.repeat(goals, noise.shape[2], axis=1), noise.reshape(len(seeds), -1, 6), seeds)
         times_s = np.arange(states.shape[1]) / RATE_HZ
-        return [Rollout((Shot(0, times_s, own),), conduct) for own, conduct in zip(states, conducts, strict=True)]
+        return [Rollout((Shot(0, times_s, own),), control) for own, control in zip(states, histories, strict=True)]
 
-    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[Conduct]:
-        """Play by a strategy that the seed decides; scored is 1 when the team scored at least once, and else 0."""
+    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[ControlHistory]:
+        """Commands and scores of a game by a strategy of the seed; `SCORED` is 1 if the team scored, else 0."""
         drawn = np.array([[np.random.default_rng(seed).integers(STRATEGIES)] for seed in seeds])
         _check(drawn, noise[:, None], seeds)
         return _play(np.repeat(drawn, noise.shape[1], axis=1), noise, seeds)[1]
@@ -90,8 +92,8 @@ def _check(goals: Integers, noise: Floats, seeds: Sequence[int]) -> None:
         raise MtmError(f"strategies are numbers from 0 to {STRATEGIES - 1}; leave out {goals.min()} to {goals.max()}")
 
 
-def _play(numbers: Integers, noise: Floats, seeds: Sequence[int]) -> tuple[Floats, list[Conduct]]:
-    """States (rollouts, ticks + 1, 14) and conducts; `numbers` (rollouts, ticks) are strategies tick by tick."""
+def _play(numbers: Integers, noise: Floats, seeds: Sequence[int]) -> tuple[Floats, list[ControlHistory]]:
+    """States (rollouts, ticks + 1, 14) and histories; `numbers` (rollouts, ticks) are strategies tick by tick."""
     import torch
 
     count, ticks, _ = noise.shape
@@ -104,7 +106,7 @@ def _play(numbers: Integers, noise: Floats, seeds: Sequence[int]) -> tuple[Float
     away_m, scored = np.empty((count, ticks)), np.zeros(count)
     asked, sent = np.empty_like(noise), np.empty_like(noise)
     for tick in range(ticks):
-        base[:, tick] = team.actions(strategies(numbers[:, tick]), _sight(env)).reshape(count, 6)
+        base[:, tick] = team.actions(strategies(numbers[:, tick]), _game_state(env)).reshape(count, 6)
         asked[:, tick] = base[:, tick] + noise[:, tick]
         sent[:, tick] = np.clip(asked[:, tick], -LIMIT, LIMIT)
         actions = torch.tensor(sent[:, tick].reshape(count, 3, 2), dtype=torch.float32)
@@ -115,7 +117,7 @@ def _play(numbers: Integers, noise: Floats, seeds: Sequence[int]) -> tuple[Float
             env.reset_at(int(row), return_observations=False)
         states[:, tick + 1] = _state(env)
     return states, [
-        Conduct(
+        ControlHistory(
             base[row], asked[row], sent[row], {MEAN_DISTANCE: float(away_m[row].mean()), SCORED: float(scored[row])}
         )
         for row in range(count)
@@ -123,7 +125,7 @@ def _play(numbers: Integers, noise: Floats, seeds: Sequence[int]) -> tuple[Float
 
 
 def _environment(count: int, seed: int) -> "Environment":
-    """The scenario without the observations, shaped rewards and statistics that nobody here reads."""
+    """The scenario without its observations, shaped rewards and statistics, none of which are used."""
     import torch
     from vmas import make_env
     from vmas.scenarios.football import Scenario
@@ -143,9 +145,9 @@ def _environment(count: int, seed: int) -> "Environment":
     )  # fmt: skip
 
 
-def _sight(env: "Environment") -> Sight:
+def _game_state(env: "Environment") -> GameState:
     scenario = env.scenario
-    return Sight(
+    return GameState(
         np.stack([np.asarray(agent.state.pos, dtype=np.float64) for agent in scenario.blue_agents], axis=1),
         np.stack([np.asarray(agent.state.vel, dtype=np.float64) for agent in scenario.blue_agents], axis=1),
         np.asarray(scenario.ball.state.pos, dtype=np.float64),

@@ -66,8 +66,8 @@ def strategies(numbers: Integers) -> Strategies:
 
 
 @dataclass(frozen=True)
-class Sight:
-    """What n teams see: own positions and velocities (n, 3, 2), and those of the ball (n, 2)."""
+class GameState:
+    """What n teams observe: positions and velocities of their agents (n, 3, 2) and of the ball (n, 2)."""
 
     own_xy_m: Floats
     own_mps: Floats
@@ -83,7 +83,7 @@ class Team:
         self._standing_back = np.full(games, -1)
         self._time_s = 0.0
 
-    def actions(self, chosen: Strategies, sight: Sight) -> Floats:
+    def actions(self, chosen: Strategies, sight: GameState) -> Floats:
         """The next action of every agent, (n, 3, 2), within -1 and 1."""
         ball_xy_m = sight.ball_xy_m + _LEAD_S * sight.ball_mps
         towards = _unit(self._aims_xy_m(chosen, sight) - ball_xy_m)
@@ -100,7 +100,7 @@ class Team:
         actions = _HOLD_S_PER_M * wanted_mps + _GAIN_S_PER_M * (wanted_mps - sight.own_mps)
         return np.clip(actions, -1.0, 1.0)
 
-    def _aims_xy_m(self, chosen: Strategies, sight: Sight) -> Floats:
+    def _aims_xy_m(self, chosen: Strategies, sight: GameState) -> Floats:
         """Where each ball is to go: into the goal, now and then to the foremost of the team."""
         aside_m = _AIM_ASIDE_M * chosen.biases
         goal_xy_m = GOAL_XY_M + np.column_stack([np.zeros_like(aside_m), aside_m])
@@ -118,7 +118,7 @@ class Team:
         return order
 
 
-def _keep_place(chosen: Strategies, sight: Sight, own_xy_m: Floats) -> Floats:
+def _keep_place(chosen: Strategies, sight: GameState, own_xy_m: Floats) -> Floats:
     """Velocities (n, 2) of those who stand back, to their places in the formation."""
     places_m = chosen.formations_m * np.column_stack([np.ones_like(chosen.biases), chosen.biases])
     target_xy_m = np.clip(sight.ball_xy_m + places_m, -_PITCH_M, _PITCH_M)

@@ -1,18 +1,21 @@
 """The Lunar Lander world: Gymnasium's own physics, and proportional-derivative controllers that hover and land.
 
+See the paper's appendices "Policy and Controller Details" and "Lunar Lander: Numerical Results".
+
 Physics, engine rules and their dispersion are those of Gymnasium's continuous environment, without wind, which is its
 default. Lengths are the simulator's metres, of which the picture shows 20 x 13.3; x to the right, y up, angles
 counter-clockwise.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from Box2D import b2Body as Body
 from gymnasium.envs.box2d import lunar_lander
 
-from hil.worlds.world import Conduct, Integers, Rollout, Shot
+from hil.worlds.lander_pictures import drawn, rendered
+from hil.worlds.lander_states import state_of
+from hil.worlds.world import ControlHistory, Integers, Rollout, Shot
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.track import Floats
 from mtm_audit.tracking.registry import Tracker
@@ -24,18 +27,11 @@ HOVER_Y_M = 10.0
 SKY_PX = (0, 0, 600, 200)
 WARM_UP_TICKS = 150
 
-# Columns of a shot's states: the terrain's heights, then x, y and angle of the lander and of its two legs, then x, y
-# and remaining life of each particle of the flames, oldest first, NaN where there are fewer.
-TERRAIN_POINTS = 11
-BODIES = 3
-# A particle lives for at most seven pictures, and two are born in a tick.
-MOST_PARTICLES = 16
-
 # The paper does not give its controller's gains, and accuracy hangs on them. These were chosen, on seeds below 10,000,
 # so that accuracies come near the paper's at M = 8 with T = 192 and 288; at T = 96 they lie well above the paper's. A
 # lightly damped turn lets the side engine's noise across its dead zone of a half; a stiff lift, which runs the main
 # engine's command into its limits in a third of all ticks, fights the noise as the paper's loop does.
-LEAN_PER_M, LEAN_PER_MPS, MOST_LEAN_RAD = 0.03, 0.1, 0.3
+LEAN_PER_M, LEAN_PER_MPS, MAX_LEAN_RAD = 0.03, 0.1, 0.3
 TURN_PER_RAD, TURN_PER_RADPS = 10.0, 1.0
 LIFT_PER_M, LIFT_PER_MPS = 10.0, 6.0
 # Half power of the main engine does not carry the lander; this does, about.
@@ -46,14 +42,13 @@ LANDING_LEAN_PER_M, LANDING_LEAN_PER_MPS = 0.05, 0.15
 SINK_PER_S, SINK_MPS = 0.6, (0.5, 4.0)
 
 _STREAM = 23
-FADING_PER_PICTURE = 0.15
 
 
 class LunarLander:
-    """One lander hovers over eight pads in turn: each a descent of its own, of which the hover is filmed.
+    """A lander that hovers over eight pads in turn; each is a descent of its own, of which the hover is filmed.
 
-    An environment that Gymnasium ends (by touching the moon or by leaving the picture at a side) is flown on and
-    filmed, as nobody could tell the camera to forget it; `run` counts such goals in the score "ended goals".
+    When Gymnasium ends an environment (the lander touches the moon or leaves the picture at a side), the rollout goes
+    on and is filmed all the same, since a camera would film it too; `run` counts such goals in the score "ended goals".
     """
 
     name = "lunar-lander"
@@ -65,7 +60,7 @@ class LunarLander:
     picture_px = (lunar_lander.VIEWPORT_W, lunar_lander.VIEWPORT_H)
 
     def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
-        """Hover over each goal's pad for as many ticks as it has noise: one rollout for each seed.
+        """One rollout for each seed, which hovers over each goal's pad for as many ticks as the goal has noise.
 
         `goals` (rollouts, goals) are numbers of pads from left to right; `noise` (rollouts, goals, ticks, 2) is added
         to the side engine's and the main engine's command.
@@ -73,10 +68,10 @@ class LunarLander:
         environment = lunar_lander.LunarLander(continuous=True)
         return [_rollout(environment, pads, added, seed) for pads, added, seed in zip(goals, noise, seeds, strict=True)]
 
-    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[Conduct]:
-        """Descend and land between the flags, under noise until both legs stand on the ground.
+    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[ControlHistory]:
+        """Commands and return of a landing between the flags, under noise until both legs stand on the ground.
 
-        There the engines are shut off, or their noise would keep the lander from the rest that Gymnasium waits for.
+        Then the engines are shut off: their noise would keep the lander moving, and Gymnasium waits until it rests.
         The score "episodic return" is the sum of Gymnasium's rewards until it ends the episode or `noise` does.
         """
         environment = lunar_lander.LunarLander(continuous=True)
@@ -84,14 +79,10 @@ class LunarLander:
 
     def pictures(self, shot: Shot) -> Iterator[Frame]:
         """The shot drawn like Gymnasium's `rgb_array`, flames included."""
-        from hil.worlds.lander_pictures import drawn
-
         return drawn(shot)
 
     def native_pictures(self, shot: Shot) -> Iterator[Frame]:
         """The shot drawn by Gymnasium itself; raises MtmError when pygame is missing."""
-        from hil.worlds.lander_pictures import rendered
-
         return rendered(shot)
 
     def tracker(self) -> Tracker:
@@ -111,7 +102,7 @@ def hover_action(body: Body, pad_x_m: float) -> tuple[float, float]:
 
 
 def landing_action(body: Body, ground_y_m: float) -> tuple[float, float]:
-    """The same for a descent to the middle of the picture, the slower the nearer the ground."""
+    """The same commands for a descent to the middle of the picture, slower near the ground."""
     height_m = body.position.y - ground_y_m
     sink_mps = min(max(SINK_PER_S * height_m, SINK_MPS[0]), SINK_MPS[1])
     main = HOVER_THROTTLE - LIFT_PER_MPS * (sink_mps + body.linearVelocity.y)
@@ -120,7 +111,7 @@ def landing_action(body: Body, ground_y_m: float) -> tuple[float, float]:
 
 def _side(body: Body, pad_x_m: float, lean_per_m: float, lean_per_mps: float) -> float:
     lean_rad = lean_per_m * (body.position.x - pad_x_m) + lean_per_mps * body.linearVelocity.x
-    error_rad = body.angle - _limited(lean_rad, MOST_LEAN_RAD)
+    error_rad = body.angle - _limited(lean_rad, MAX_LEAN_RAD)
     return _limited(TURN_PER_RAD * error_rad + TURN_PER_RADPS * body.angularVelocity, 1.0)
 
 
@@ -137,7 +128,7 @@ def _rollout(environment: lunar_lander.LunarLander, pads: Integers, noise: Float
         shots.append(Shot(number * ticks, first_s + np.arange(ticks + 1) / LunarLander.rate_hz, states))
         bases.append(base)
         ended += lost
-    return Rollout(tuple(shots), _conduct(np.concatenate(bases), noise.reshape(-1, 2), {"ended goals": float(ended)}))
+    return Rollout(tuple(shots), _history(np.concatenate(bases), noise.reshape(-1, 2), {"ended goals": float(ended)}))
 
 
 def _descent(
@@ -152,15 +143,15 @@ def _descent(
         side, main = hover_action(environment.lander, pad_x_m)
         lost |= environment.step(np.array((main, side)))[2]  # type: ignore[no-untyped-call]
     environment.render_mode = "rgb_array"
-    states, base = [_state(environment)], np.empty_like(noise)
+    states, base = [state_of(environment)], np.empty_like(noise)
     for tick, added in enumerate(noise):
         base[tick] = hover_action(environment.lander, pad_x_m)
         lost |= environment.step((base[tick] + added)[::-1])[2]  # type: ignore[no-untyped-call]
-        states.append(_state(environment))
+        states.append(state_of(environment))
     return np.stack(states), base, lost
 
 
-def _landing(environment: lunar_lander.LunarLander, noise: Floats, seed: int) -> Conduct:
+def _landing(environment: lunar_lander.LunarLander, noise: Floats, seed: int) -> ControlHistory:
     environment.render_mode = None
     environment.reset(seed=_environment_seed([seed]))
     ground_y_m = environment.helipad_y + lunar_lander.LEG_DOWN / lunar_lander.SCALE
@@ -173,25 +164,13 @@ def _landing(environment: lunar_lander.LunarLander, noise: Floats, seed: int) ->
         total += float(reward)
         if ended:
             break
-    return _conduct(np.array(base), np.array(added), {"episodic return": total})
+    return _history(np.array(base), np.array(added), {"episodic return": total})
 
 
-def _conduct(base: Floats, noise: Floats, scores: dict[str, float]) -> Conduct:
+def _history(base: Floats, noise: Floats, scores: dict[str, float]) -> ControlHistory:
     asked = base + noise
-    return Conduct(base, asked, np.clip(asked, -1.0, 1.0), scores)
+    return ControlHistory(base, asked, np.clip(asked, -1.0, 1.0), scores)
 
 
 def _environment_seed(parts: Sequence[int]) -> int:
     return int(np.random.SeedSequence([_STREAM, *parts]).generate_state(1)[0])
-
-
-def _state(environment: lunar_lander.LunarLander) -> Floats:
-    """One row of states; the flames fade by a picture, which Gymnasium does as it draws them."""
-    for particle in environment.particles:
-        particle.ttl -= FADING_PER_PICTURE
-    environment._clean_particles(False)  # type: ignore[no-untyped-call]
-    terrain = [polygon[0][1] for polygon in environment.sky_polys] + [environment.sky_polys[-1][1][1]]
-    bodies = [(*body.position, body.angle) for body in environment.drawlist]
-    flames = [(*particle.position, particle.ttl) for particle in environment.particles]
-    flames += [(math.nan,) * 3] * (MOST_PARTICLES - len(flames))
-    return np.concatenate([terrain, np.ravel(bodies), np.ravel(flames)])

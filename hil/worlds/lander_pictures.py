@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.envs.box2d import lunar_lander
 from numpy.typing import NDArray
 
-from hil.worlds.lander import BODIES, FADING_PER_PICTURE, TERRAIN_POINTS
+from hil.worlds.lander_states import FADING_PER_PICTURE, TERRAIN_POINTS, parts_of
 from hil.worlds.world import Shot
 from mtm_audit.model.picture import Frame, Image
 from mtm_audit.model.track import Floats
@@ -38,7 +38,7 @@ def drawn(shot: Shot) -> Iterator[Frame]:
     background = _background(shot.states[0, :TERRAIN_POINTS])
     for time_s, state in zip(shot.times_s, shot.states, strict=True):
         image = background.copy()
-        bodies, flames = _parts(state)
+        bodies, flames = parts_of(state)
         for x_m, y_m, life in flames:
             _draw_speck(image, x_m, y_m, life)
         for shape_m, (x_m, y_m, angle_rad) in zip(SHAPES_M, bodies, strict=True):
@@ -75,19 +75,12 @@ def _pose(environment: lunar_lander.LunarLander, state: Floats) -> None:
     environment.sky_polys = [
         [left, right, (right[0], height_m), (left[0], height_m)] for left, right in pairwise(points)
     ]
-    bodies, flames = _parts(state)
+    bodies, flames = parts_of(state)
     for body, (x_m, y_m, angle_rad) in zip(environment.drawlist, bodies.tolist(), strict=True):
         body.position, body.angle = (x_m, y_m), angle_rad
     environment._clean_particles(True)  # type: ignore[no-untyped-call]
     for x_m, y_m, life in flames.tolist():
         environment._create_particle(1.0, x_m, y_m, life + FADING_PER_PICTURE)  # type: ignore[no-untyped-call]
-
-
-def _parts(state: Floats) -> tuple[Floats, Floats]:
-    """Rows of x, y, angle of the lander and its legs, and of x, y, life of the flames' particles."""
-    parts = state[TERRAIN_POINTS:].reshape(-1, 3)
-    flames = parts[BODIES:]
-    return parts[:BODIES], flames[~np.isnan(flames[:, 0])]
 
 
 def _background(terrain_m: Floats) -> Image:

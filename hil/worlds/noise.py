@@ -1,4 +1,7 @@
-"""The noise of a rollout, tick by tick, in the order of a world's axes: keyed, white or none."""
+"""The noise of a rollout, tick by tick, in the order of a world's axes: keyed, white or none.
+
+Keyed noise comes from the onboard runtime's Modulator, which is all of the runtime that the four worlds use.
+"""
 
 from collections.abc import Sequence
 
@@ -19,9 +22,10 @@ def axis_columns(scheme: Scheme, axes: Sequence[str]) -> dict[str, list[int]]:
 
 
 def keyed_noise(codebook: Codebook, messages: Sequence[Sequence[int]], axes: Sequence[str]) -> Floats:
-    """What the modulators of all channels add while they send `messages` one after the other: (ticks, axes).
+    """(ticks, axes): what the channels' modulators add to the commands while they send `messages` in a row.
 
-    Each message is the whole message's symbols; axes that no channel uses stay at zero.
+    In units of the command. Each of `messages` holds all symbols of one message; axes of no channel stay zero. It is
+    what the encoding of the paper's Section "Encoding and Decoding" injects.
     """
     scheme = codebook.scheme
     columns = axis_columns(scheme, axes)
@@ -37,7 +41,7 @@ def keyed_noise(codebook: Codebook, messages: Sequence[Sequence[int]], axes: Seq
 
 
 def white_noise(scheme: Scheme, ticks: int, axes: Sequence[str], generator: np.random.Generator) -> Floats:
-    """White Gaussian noise of the same standard deviations on the same axes: (ticks, axes)."""
+    """(ticks, axes): white Gaussian noise of the scheme's standard deviations on the scheme's axes."""
     columns = axis_columns(scheme, axes)
     noise = np.zeros((ticks, len(axes)))
     for channel in scheme.channels:

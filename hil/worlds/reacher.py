@@ -1,10 +1,12 @@
 """The paper's Reacher: an arm of two links goes from target to target under a stochastic policy.
 
+See the paper's appendices "Policy and Controller Details" and "Reacher: Numerical Results".
+
 Gymnasium's Reacher-v5 (its own model file, MuJoCo's physics, two steps of 10 ms a tick: 50 Hz) and a policy trained by
 soft actor-critic. The policy's action is tanh(mean + std * eps) with eps standard normal, mean and std both functions
-of the observation; the keyed noise takes the place of eps. The paper's sigma = 1.0 is read as this unit variance: the
-return that it reports cannot be had with torque noise of standard deviation 1, whose penalty alone, 0.1 per squared
-unit in either joint, takes 10 off in 50 steps.
+of the observation; the keyed noise takes the place of eps. The paper's sigma = 1.0 is read as this unit variance: with
+torque noise of standard deviation 1 the return that it reports is impossible, since the penalty alone, 0.1 per squared
+unit in either joint, is 10 in 50 steps.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,7 +17,7 @@ import numpy as np
 
 from hil.worlds.reacher_pictures import drawn_pictures, rendered_pictures
 from hil.worlds.reacher_policy import trained_policy
-from hil.worlds.world import Conduct, Integers, Rollout, Shot
+from hil.worlds.world import ControlHistory, Integers, Rollout, Shot
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.track import Floats
 from mtm_audit.tracking.registry import Tracker
@@ -35,10 +37,10 @@ _START, _NOISE = 0, 1
 class Reacher:
     """The arm; goals are eight targets on a ring, counter-clockwise from +x.
 
-    States are inner and outer joint angle (rad) and the target's x and y (m). An axis without noise in a whole
-    rollout is no axis without noise: the policy is a Gaussian one, and its eps is then drawn white from the seed. In
-    a rollout's conduct, `base` is tanh(mean), `asked` is mean + std * eps, and `sent` is tanh of that: nothing is
-    clamped, but large actions are squashed towards 1, full torque.
+    States are inner and outer joint angle (rad) and the target's x and y (m). The policy is Gaussian: on an axis that
+    has no keyed noise in a whole rollout, its eps is drawn white from the seed. In a rollout's control history `base`
+    is tanh(mean), `requested` is mean + std * eps, and `applied` is tanh of that: nothing is clamped, but large actions
+    are squashed towards 1, full torque.
     """
 
     name = "reacher"
@@ -56,7 +58,7 @@ class Reacher:
         self._policy = trained_policy()
 
     def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
-        """Go to one target after the other without a break, from a pose of the seed: one shot for each seed.
+        """One rollout of one shot for each seed, from a pose of the seed to one target after the other.
 
         `goals` (rollouts, goals), `noise` (rollouts, goals, ticks, axes) in units of the policy's own standard
         deviation. Score: the mean distance between fingertip and target at the end of each goal's time.
@@ -83,11 +85,11 @@ class Reacher:
         times_s = np.arange(len(states)) / self.rate_hz
         shots = [Shot(0, times_s, path) for path in np.stack(states, axis=1)]
         scores = [{"final distance (m)": float(miss_m.mean())} for miss_m in misses_m]
-        conducts = _conducts(driven, scores)
-        return [Rollout((shot,), conduct) for shot, conduct in zip(shots, conducts, strict=True)]
+        histories = _histories(driven, scores)
+        return [Rollout((shot,), control) for shot, control in zip(shots, histories, strict=True)]
 
-    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[Conduct]:
-        """Fifty steps from near the rest pose to a target of the seed, within 0.20 m in each axis.
+    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[ControlHistory]:
+        """Commands and return of 50 steps from near the rest pose to a target of the seed within 0.20 m in each axis.
 
         `noise` is (rollouts, 50, axes). Score: the return, the sum of -|fingertip - target| - 0.1 |action|^2.
         """
@@ -99,7 +101,7 @@ class Reacher:
             driven.append(self._tick(arms, eps[:, tick]))
             returns -= [self._miss_m(arm) for arm in arms]
             returns -= _ACTION_WEIGHT * np.square(driven[-1][2]).sum(axis=1)
-        return _conducts(driven, [{"50-step return": float(total)} for total in returns])
+        return _histories(driven, [{"50-step return": float(total)} for total in returns])
 
     def pictures(self, shot: Shot) -> Iterator[Frame]:
         """The shot seen from above, drawn by the software camera."""
@@ -165,10 +167,12 @@ class Reacher:
         return float(np.linalg.norm(self._offset_m(arm)))
 
 
-def _conducts(driven: Sequence[tuple[Floats, Floats, Floats]], scores: Sequence[dict[str, float]]) -> list[Conduct]:
+def _histories(
+    driven: Sequence[tuple[Floats, Floats, Floats]], scores: Sequence[dict[str, float]]
+) -> list[ControlHistory]:
     """From what `_tick` gave in each tick, and the scores of each arm."""
     base, asked, sent = (np.stack(part, axis=1) for part in zip(*driven, strict=True))
-    return [Conduct(base[arm], asked[arm], sent[arm], own) for arm, own in enumerate(scores)]
+    return [ControlHistory(base[arm], asked[arm], sent[arm], own) for arm, own in enumerate(scores)]
 
 
 def _policy_noise(noise: Floats, seeds: Sequence[int]) -> Floats:

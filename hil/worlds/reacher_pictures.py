@@ -1,7 +1,7 @@
 """Pictures of the Reacher from straight above: by a software camera, and by MuJoCo's own renderer.
 
-Both show Gymnasium's model as MuJoCo draws it, four samples a pixel, but for the hues of the two links: the model
-paints both the same blue, in which nobody could tell the inner arm from the outer one, as the paper does by hue.
+Both show Gymnasium's model as MuJoCo draws it, four samples a pixel, but for the hues of the two links: in the
+model both are the same blue, and the paper tells the inner arm from the outer one by hue.
 """
 
 import os

@@ -1,5 +1,7 @@
 """The paper's RoboMaster task: four robots drive a six-waypoint zigzag side by side, then each to its own target.
 
+See the paper's Figure "robomaster-plots" and its appendix "Policy and Controller Details".
+
 A proportional go-to-goal controller at the control rate gives each robot its base velocity, capped at the base
 speed; heading is held at zero. Positions are in the world frame, metres, origin at the arena's centre.
 """
@@ -43,7 +45,7 @@ class Route:
 
 
 class Task(Protocol):
-    """What gives one robot its base commands."""
+    """The task controller of one robot."""
 
     def command(self, position_xy_m: tuple[float, float], heading_rad: float) -> BodyVelocity:
         """Base velocity in the body frame for the present pose; asked once a tick."""

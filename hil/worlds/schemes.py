@@ -1,4 +1,4 @@
-"""The paper's schemes of the four simulated worlds."""
+"""The paper's schemes of the four simulated worlds (its Section "Design Space": single, same, split)."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,9 @@ from mtm_onboard.protocol.scheme import Power
 
 @dataclass(frozen=True)
 class WorldSignal:
-    """How a world is signalled on: the paper's appendices on policies and on detection.
+    """Rate, band, noise and channels of a world.
+
+    Source: the paper's appendices "Policy and Controller Details" and "Detection Pipeline Details".
 
     `channels`: name, body and axes of each; `one_body` when they are all axes of the same body.
     """

@@ -1,4 +1,9 @@
-"""What every simulated world gives: rollouts of its task under any noise, and pictures of them."""
+"""What every simulated world gives: rollouts of its task under any noise, and pictures of them.
+
+The worlds are those of the paper's Section "Results"; its appendix "Policy and Controller Details" says how they are
+driven. A world steps its own simulator under a noise array that was computed before: neither the onboard loop nor its
+guard nor a wire is part of it (see docs/worlds.md).
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +22,7 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Shot:
-    """One uninterrupted stretch of a rollout in front of the camera, `first_tick` being the tick that it begins with.
+    """One uninterrupted filmed part of a rollout, which begins with tick `first_tick`.
 
     `times_s` (n + 1,): instants of the frames, one before its first tick and one after each of its n ticks, on the
     recording's clock; `states` (n + 1, k): where everything is, in columns of the world's own.
@@ -29,25 +34,25 @@ class Shot:
 
 
 @dataclass(frozen=True)
-class Conduct:
-    """How a rollout was driven, tick by tick.
+class ControlHistory:
+    """The commands of a rollout, tick by tick.
 
-    `base` (n, axes) is what the task asked for, `asked` (n, axes) the same with the noise, `sent` (n, axes) what was
-    left of that within the limits; `scores` are the paper's measures of the task, by name.
+    `base` (n, axes) is the task controller's command, `requested` (n, axes) the same with the noise, `applied` (n,
+    axes) what the world's limits left of that; `scores` are the paper's measures of the task, by name.
     """
 
     base: Floats
-    asked: Floats
-    sent: Floats
+    requested: Floats
+    applied: Floats
     scores: Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class Rollout:
-    """One run of the task: what the camera saw, in order, and how it was driven (off camera ticks left out)."""
+    """One run of the task: its filmed shots in order, and its commands without the ticks that were not filmed."""
 
     shots: tuple[Shot, ...]
-    conduct: Conduct
+    control: ControlHistory
 
 
 class World(Protocol):
@@ -67,15 +72,15 @@ class World(Protocol):
     picture_px: tuple[int, int]
 
     def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
-        """Pursue one goal after the other under noise, in full view: one rollout for each seed.
+        """One filmed rollout for each seed, which pursues one goal after the other under noise.
 
         `goals` (rollouts, goals) are numbers below `choices`; `noise` (rollouts, goals, ticks, axes) in units of the
         command, one goal being pursued for that many ticks. The seed decides everything else.
         """
         ...
 
-    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[Conduct]:
-        """Do the paper's task once for each seed under `noise` (rollouts, task_ticks, axes), unfilmed."""
+    def perform(self, noise: Floats, seeds: Sequence[int]) -> list[ControlHistory]:
+        """Commands and scores of the paper's task, once a seed, under `noise` (rollouts, task_ticks, axes)."""
         ...
 
     def pictures(self, shot: Shot) -> Iterator[Frame]:
@@ -92,7 +97,7 @@ class World(Protocol):
 
 
 def check_axes(world: World, scheme: Scheme) -> None:
-    """Raise MtmError when the scheme has an axis that the world has not."""
+    """Raise MtmError when the scheme uses an axis that the world does not have."""
     used = [f"{channel.body}.{axis}" for channel in scheme.channels for axis in channel.axes]
     foreign = [axis for axis in used if axis not in world.axes]
     if foreign:

@@ -54,7 +54,8 @@ class ChannelReading:
     `posteriors` (positions, M): probability of each symbol at each position, given that a message is there;
     `window_ratios` (windows, M): log-likelihood ratios in nats, the same for anything but the symbol;
     `decoy_strengths` (decoys,): the strength that the same search found under keys that nobody holds; `prepared` is
-    the motion made ready for evidence, None from a detector that gives none.
+    the motion made ready for evidence, None from a detector that gives none; `alone` and
+    `alone_strength` are the timing and strength that the channel's own search found, before others had a say.
     """
 
     reading: Reading
@@ -62,6 +63,8 @@ class ChannelReading:
     window_ratios: Floats
     decoy_strengths: Floats
     prepared: Prepared | None = None
+    alone: Timing | None = None
+    alone_strength: float | None = None
 
 
 class Detector(Protocol):

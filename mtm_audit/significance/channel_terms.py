@@ -40,6 +40,7 @@ class ChannelTerms:
     `groups` (windows,) numbers the windows that are played from one waveform, `positions` (groups,) says which message
     position each carries. `candidates` (shown positions, k) are the symbols that are looked at, those that score best;
     `tones` (groups, k, injected axes, 2 K) theirs. `shared` when one codebook serves all positions (fixed schedule).
+    `timing` is what all channels together found; `alone` and `strength` are what this one found by itself.
     """
 
     prepared: Prepared
@@ -55,6 +56,7 @@ class ChannelTerms:
     alphabet_size: int
     shared: bool
     strength: float
+    alone: Timing
     _terms: dict[Timing, "Terms"] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -217,7 +219,8 @@ def channel_terms(
         law=scheme.power,
         alphabet_size=scheme.alphabet_size,
         shared=shared,
-        strength=found.strength,
+        strength=found.strength if reading.alone_strength is None else reading.alone_strength,
+        alone=found.timing if reading.alone is None else reading.alone,
     )
 
 

@@ -70,7 +70,7 @@ def _approximate(
     aligned = np.einsum("roa,lpgoac->lprgc", turns, found, optimize=True) * magnitudes[..., None, None]
     curved = 0.5 * np.einsum("roa,rqa,lpgoq->lprg", turns, turns, moments, optimize=True)
     curved -= 0.5 * turns.shape[2] * np.log1p(quadratic / count).sum(axis=-1)[:, :, None]
-    result = aligned - spent[:, :, None] - curved[..., None]
+    result = aligned - 0.5 * spent[:, :, None] - curved[..., None]
     return np.asarray(result.transpose(1, 0, 2, 3, 4))
 
 

@@ -116,11 +116,14 @@ def _largest(values: Floats, count: int) -> Integers:
 
 
 def _anchor(channels: Sequence[ChannelTerms], channel: ChannelTerms) -> Timing:
-    """The timing of the channel in `channels` that shows most, as `channel` counts its windows."""
+    """The timing of the channel in `channels` that shows most, as `channel` counts its windows.
+
+    What that channel found by itself: a timing that `channel` had a say in would depend on its candidates.
+    """
     strongest = max(channels, key=lambda other: other.strength)
     if strongest is channel:
         return channel.timing
-    return at_phase_of(channel.timing, strongest.timing, channel.span.window_ticks)
+    return at_phase_of(channel.timing, strongest.alone, channel.span.window_ticks)
 
 
 def _alike(channels: Sequence[ChannelTerms]) -> bool:

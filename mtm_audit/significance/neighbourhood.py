@@ -87,7 +87,9 @@ def _onsets(span: Span, onset: Onset, half_s: float) -> int:
     """How many onsets the grid has: one window's worth where nothing is known, for each order of the symbols."""
     if isinstance(onset, OnsetRange):
         return math.ceil((onset.high_s - onset.low_s + _LATEST_S - _EARLIEST_S) / half_s) + 1
-    return span.order * (math.ceil(1.25 * span.window_ticks / span.nominal_hz / half_s) + 1)
+    # Neighbourhoods at either end of a window's worth of onsets reach beyond it.
+    beyond = 2 * len(_SHIFTS)
+    return span.order * (math.ceil(1.25 * span.window_ticks / span.nominal_hz / half_s) + 1 + beyond)
 
 
 def at_phase_of(own: Timing, other: Timing, window_ticks: int) -> Timing:

@@ -15,17 +15,17 @@ _ARPHRD_CAN = 280  # from <linux/if_arp.h>
 _IFF_UP = 1  # from <linux/if.h>
 # Heartbeats and commands come in bursts of some thirty frames.
 _SHORTEST_QUEUE = 100
-_PATIENCE_S = 5.0
+_TIMEOUT_S = 5.0
 
 
 def link_details(name: str) -> dict[str, Any] | None:
-    """What `ip` says of the interface beyond /sys; None without iproute2, or when it says nothing."""
+    """What `ip` reports of the interface beyond /sys; None without iproute2, or when it reports nothing."""
     program = shutil.which("ip")
     if program is None:
         return None
     with suppress(OSError, subprocess.SubprocessError, ValueError, LookupError, TypeError):
         asked = [program, "-details", "-json", "link", "show", "dev", name]
-        shown = subprocess.run(asked, check=True, capture_output=True, timeout=_PATIENCE_S).stdout
+        shown = subprocess.run(asked, check=True, capture_output=True, timeout=_TIMEOUT_S).stdout
         return dict(json.loads(shown)[0]["linkinfo"])
     return None
 
@@ -36,7 +36,7 @@ def check_interface(
     folder: Path = _INTERFACES,
     details: Callable[[str], dict[str, Any] | None] = link_details,
 ) -> Finding:
-    """The interface is there, up, at the robot's bit rate, with room for a burst of frames, and its bus is sound."""
+    """Check that the interface exists, is up, has the robot's bit rate and room for a burst, and sees no bus errors."""
     place = folder / name
     if not name or not place.is_dir():
         return Finding("link", "fail", f"there is no CAN interface {name!r}; plug the adapter in, and see ip link")

@@ -1,4 +1,4 @@
-"""All checks of one robot, in the order in which somebody would mend what they find."""
+"""All checks of one robot, in the order in which their findings are best put right."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from mtm_onboard.runtime.config import load_config
 
 
 def examine(config_path: Path, key_path: Path, loop_s: float) -> list[Finding]:
-    """What is found of the robot; its loop is watched for `loop_s`.
+    """The findings of all checks; the loop is measured for `loop_s`.
 
     Without a configuration and a key the checks that need both are left out. No command is sent and no link opened.
     """

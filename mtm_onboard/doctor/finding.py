@@ -1,4 +1,4 @@
-"""What a check found."""
+"""The finding of a check, and how findings are printed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ _WORST_LAST: tuple[Status, ...] = ("pass", "warn", "fail")
 
 @dataclass(frozen=True)
 class Finding:
-    """What was looked at, how it is, and in words what to do about it; the names of `figures` hold their unit."""
+    """What was checked, its status, and in words what to do about it; the names of `figures` hold their unit."""
 
     check: str
     status: Status

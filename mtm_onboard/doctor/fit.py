@@ -7,12 +7,12 @@ from mtm_onboard.model.velocity import AXES
 from mtm_onboard.protocol import Channel, Key, MtmError, Scheme
 from mtm_onboard.runtime.config import RobotConfig
 
-# Parts of the ticks whose noise a limit may cut: beyond the first auditors notice, beyond the second they read little.
-_MANY, _MOST = 0.01, 0.5
+# Share of the ticks whose noise a limit may cut: above the first decoding gets worse, above the second it mostly fails.
+_WARN_SHARE, _FAIL_SHARE = 0.01, 0.5
 
 
 def check_fit(config: RobotConfig, key: Key) -> Finding:
-    """The channel is the key's, its axes are a body's, and the limits leave the noise whole."""
+    """Check that the channel is the key's, its axes are a body velocity's, and the limits do not cut its noise."""
     try:
         channel = key.scheme.channel(config.robot.channel)
     except MtmError as error:
@@ -35,14 +35,14 @@ def _check_limits(config: RobotConfig, scheme: Scheme, channel: Channel) -> Find
     parts = _parts_cut(config, scheme, channel)
     limit, part = max(parts.items(), key=lambda item: item[1])
     figures = {"cut_part": round(part, 6)}
-    if part <= _MANY:
+    if part <= _WARN_SHARE:
         return Finding(
             "fit", "pass",
             f"channel {channel.name} on {', '.join(channel.axes)}, sigma {channel.sigma:g}: at a standstill the limits "
             "leave the noise whole", figures,
         )  # fmt: skip
     return Finding(
-        "fit", "fail" if part > _MOST else "warn",
+        "fit", "fail" if part > _FAIL_SHARE else "warn",
         f"even at a standstill {limit} cuts the noise of channel {channel.name} in {100 * part:.0f}% of the ticks; "
         f"raise it, or make a key with a sigma below {channel.sigma:g}", figures,
     )  # fmt: skip
@@ -65,7 +65,7 @@ def _parts_cut(config: RobotConfig, scheme: Scheme, channel: Channel) -> dict[st
 
 
 def _beyond(bound: float, axes: int) -> float:
-    """Probability that the norm of as many unit Gaussians is above `bound`; 0 for none of them."""
+    """Probability that the norm of `axes` unit Gaussians exceeds `bound`; 0 for no axes."""
     if axes == 0:
         return 0.0
     return math.exp(-0.5 * bound * bound) if axes == 2 else math.erfc(bound / math.sqrt(2.0))

@@ -10,8 +10,8 @@ from mtm_onboard.runtime.config import RealtimeSettings
 from mtm_onboard.runtime.loop import LoopStats, run_loop
 from mtm_onboard.runtime.realtime import realtime
 
-# Phase errors at the band's top, in degrees: of 15 auditors see nothing, and at 45 coherence begins to go.
-_NOTICED_DEG, _HARMFUL_DEG = 15.0, 45.0
+# Phase errors at the band's top, in degrees: 15 make no difference to the decoding, from 45 on coherence drops.
+_WARN_DEG, _FAIL_DEG = 15.0, 45.0
 _LEAD_S = 0.05
 # From <sys/timex.h>.
 _STA_UNSYNC = 0x0040
@@ -29,7 +29,7 @@ class _Timex(ctypes.Structure):
 
 
 def is_synchronised() -> bool | None:
-    """Whether the kernel holds the clock to be synchronised; None when it does not say."""
+    """Whether the kernel reports the clock as synchronised; None when it does not say."""
     state = _Timex()
     try:
         answer = ctypes.CDLL(None).adjtimex(ctypes.byref(state))
@@ -39,10 +39,10 @@ def is_synchronised() -> bool | None:
 
 
 def check_clock(schedule: str, synchronised: bool | None) -> Finding:
-    """The time of day is right, which a rolling schedule needs and a fixed one only to start robots together."""
+    """Check the time of day: a rolling schedule needs it, a fixed one only to start robots together."""
     if synchronised:
         return Finding("clock", "pass", "the system's clock is synchronised")
-    found = "nobody says that it is" if synchronised is None else "it is not"
+    found = "the system does not report that it is" if synchronised is None else "it is not"
     remedy = "install chrony (with rtcsync in its configuration) or enable systemd-timesyncd"
     if schedule == "rolling":
         return Finding(
@@ -56,7 +56,7 @@ def check_clock(schedule: str, synchronised: bool | None) -> Finding:
 
 
 def check_processors(folder: Path = _PROCESSORS) -> Finding:
-    """No processor saves power by running slowly."""
+    """Check that no processor saves power by running slowly."""
     governors = [path.read_text(encoding="ascii").strip() for path in sorted(folder.glob(_GOVERNORS))]
     slow = governors.count("powersave")
     if slow:
@@ -71,7 +71,7 @@ def check_processors(folder: Path = _PROCESSORS) -> Finding:
 
 
 def check_loop(settings: RealtimeSettings, scheme: Scheme, duration_s: float) -> list[Finding]:
-    """A loop with nothing to do, at the scheme's rate and as [realtime] asks: what is refused, how late it wakes."""
+    """Run an empty loop at the scheme's rate under [realtime]: which settings are refused, how late it wakes."""
     refused: list[str] = []
     clock, stats = SystemClock(), LoopStats()
     with realtime(settings, refused.append):
@@ -92,7 +92,7 @@ def _realtime_finding(settings: RealtimeSettings, refused: list[str]) -> Finding
 
 
 def lateness_finding(stats: LoopStats, scheme: Scheme) -> Finding:
-    """What the delays of a loop's wake-ups make of the noise: phase error at the top of its band."""
+    """The delays of the loop's wake-ups as phase errors of the noise at the top of its band."""
     late, top_hz = stats.lateness, scheme.band_hz[1]
     delays_s = {"p50": late.quantile_s(0.5), "p99": late.quantile_s(0.99), "max": late.worst_s}
     phases_deg = {name: 360.0 * top_hz * delay_s for name, delay_s in delays_s.items()}
@@ -104,7 +104,7 @@ def lateness_finding(stats: LoopStats, scheme: Scheme) -> Finding:
         f"{1e3 * delays_s['max']:.2f} ms at most in {stats.sent} ticks: "
         f"{phases_deg['p99']:.1f} degrees of phase at {top_hz:g} Hz (p99)"
     )
-    if phases_deg["p99"] <= _NOTICED_DEG:
+    if phases_deg["p99"] <= _WARN_DEG:
         return Finding("loop", "pass", text, figures)
     remedy = "end what else runs here, and give the loop a priority and a cpu in [realtime]"
-    return Finding("loop", "fail" if phases_deg["p99"] > _HARMFUL_DEG else "warn", f"{text}; {remedy}", figures)
+    return Finding("loop", "fail" if phases_deg["p99"] > _FAIL_DEG else "warn", f"{text}; {remedy}", figures)

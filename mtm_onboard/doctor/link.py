@@ -20,22 +20,22 @@ Options = dict[str, Option]
 _CONNECT_WITHIN_S = 3.0
 # python-can's interfaces whose channel is a serial device.
 _SERIAL_CAN = ("slcan", "robotell", "seeedstudio")
-_UNREAL_CAN = ("virtual", "udp_multicast")
+_VIRTUAL_CAN = ("virtual", "udp_multicast")
 
 
 def check_link(kind: str, options: Options) -> Finding:
-    """What the transport's kind needs is there; the options are taken by making the transport, unopened."""
+    """Check what this kind of transport needs; the options are checked by making the transport without opening it."""
     try:
         make_transport(kind, options)
         return _CHECKS[kind](options)
     except MtmError as error:
         return Finding("link", "fail", str(error))
     except (OSError, ValueError, TypeError, LookupError) as error:
-        return Finding("link", "fail", f"these options reach no robot ({error}); correct [transport]")
+        return Finding("link", "fail", f"these options cannot be used ({error}); correct [transport]")
 
 
 def check_serial(path: str) -> Finding:
-    """A serial device that this user may open and that no other program holds."""
+    """Check that this user may open the serial device and that no other program holds it."""
     if find_spec("serial") is None:
         return Finding("link", "fail", "pyserial is not installed; install mtm[serial] or python3-serial")
     try:
@@ -44,10 +44,10 @@ def check_serial(path: str) -> Finding:
         return Finding("link", "fail", f"{path} cannot be opened ({error.strerror}); {_serial_remedy(path, error)}")
     try:
         if not os.isatty(descriptor):
-            return Finding("link", "fail", f"{path} is no serial line; correct it in [transport]")
+            return Finding("link", "fail", f"{path} is not a serial line; correct it in [transport]")
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
-        return Finding("link", "fail", f"another program has {path}; end it")
+        return Finding("link", "fail", f"another program holds {path}; end it")
     finally:
         os.close(descriptor)
     return Finding("link", "pass", f"{path} can be opened")
@@ -68,26 +68,26 @@ def _group(path: str) -> str:
 
 
 def check_tcp(host: str, port: int) -> Finding:
-    """Somebody takes a connection there; it is closed without a byte."""
+    """Check that the host accepts a connection, which is closed without sending a byte."""
     try:
         socket.create_connection((host, port), _CONNECT_WITHIN_S).close()
     except (OSError, OverflowError) as error:
         return Finding(
             "link", "fail",
-            f"nobody answers at {host} port {port} ({error}); switch the robot on and join its network, then try "
+            f"nothing answers at {host} port {port} ({error}); switch the robot on and join its network, then try "
             f"ping {host}",
         )  # fmt: skip
     return Finding("link", "pass", f"{host} port {port} takes connections")
 
 
 def check_udp_port(host: str, port: int) -> Finding:
-    """Nobody on this computer receives there yet."""
+    """Check that no program on this computer receives there."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind((host, port))
         except (OSError, OverflowError) as error:
             return Finding(
-                "link", "fail", f"UDP port {port} cannot be had ({error}); end the program that listens there"
+                "link", "fail", f"UDP port {port} cannot be opened ({error}); end the program that listens there"
             )
     return Finding("link", "pass", f"UDP port {port} is free for what the robot sends")
 
@@ -110,7 +110,7 @@ def _check_can(options: Options) -> Finding:
     if interface in _SERIAL_CAN:
         # python-can takes the serial line's own rate after an @.
         return check_serial(channel.partition("@")[0])
-    if interface in _UNREAL_CAN:
+    if interface in _VIRTUAL_CAN:
         return Finding("link", "pass", f"the CAN interface {interface} needs no adapter")
     named = interface or "that python-can's own configuration names"
     return Finding(
@@ -148,7 +148,7 @@ def _check_mavlink(options: Options) -> Finding:
     except OSError as error:
         return Finding("link", "fail", f"the host {host} is not known ({error}); give its IP address")
     return Finding(
-        "link", "pass", f"messages go to {address} UDP port {number}; whether a vehicle hears them is unseen"
+        "link", "pass", f"messages go to {address} UDP port {number}; whether a vehicle receives them is not checked"
     )
 
 

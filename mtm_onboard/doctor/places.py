@@ -18,7 +18,7 @@ _RUNTIME_FOLDERS = Path("/run")
 
 
 def check_key_file(path: Path) -> Finding:
-    """A key file that could be loaded, so that its owner alone reads it: who that is, and who may put another there."""
+    """Check the owner of a key file that could be loaded, and whether others may replace it."""
     owner, user = path.stat().st_uid, os.getuid()
     folder = path.resolve().parent
     mode = folder.stat().st_mode
@@ -38,7 +38,7 @@ def check_key_file(path: Path) -> Finding:
 
 
 def check_journal(settings: JournalSettings | None) -> Finding:
-    """The folder takes files, and the disk has room for as much as the journal may keep."""
+    """Check that the folder is writable and the disk has room for the whole journal."""
     if settings is None:
         return Finding("journal", "pass", "none is kept, as the configuration says")
     folder = Path(settings.path).parent
@@ -63,7 +63,7 @@ def check_journal(settings: JournalSettings | None) -> Finding:
 
 
 def check_control(settings: ControlSettings | None) -> Finding:
-    """The control socket can be made; one that a crash left is removed, as the run would do."""
+    """Check that the control socket can be made; one left by a crash is removed, as the run does."""
     if settings is None:
         return Finding("control", "pass", "no control socket, as the configuration says")
     path = Path(settings.socket)

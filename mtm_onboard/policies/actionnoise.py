@@ -22,7 +22,7 @@ class KeyedActionNoise:
         return (self.noise.sigma * self.noise()).astype(np.float32)
 
     def reset(self) -> None:
-        """Nothing: an episode ends, and the message goes on."""
+        """Does nothing: the message goes on beyond the end of an episode."""
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}(sigma={self.noise.sigma.tolist()})"
@@ -35,13 +35,13 @@ class VectorKeyedActionNoise(KeyedActionNoise):
         self.noise = noise
 
     def reset(self, indices: Iterable[int] | None = None) -> None:
-        """Nothing: whichever episodes end, the messages go on."""
+        """Does nothing: the messages go on beyond the end of an episode."""
 
 
 def register_with_stable_baselines3() -> None:
     """Have stable-baselines3 take these classes for its own ActionNoise and VectorizedActionNoise.
 
-    It would else wrap the noise of several environments in copies of one. Raises MtmError when it is not installed.
+    Otherwise it wraps copies of one noise for several environments. Raises MtmError when it is not installed.
     """
     try:
         noise = importlib.import_module("stable_baselines3.common.noise")

@@ -1,4 +1,4 @@
-"""The bounds of an environment's actions, and how often they cut something."""
+"""The bounds of an environment's actions, and how often they clip one."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,8 +10,8 @@ from mtm_onboard.protocol.errors import MtmError
 class ActionBounds:
     """Keeps actions between `low` and `high`, each a number or one per component.
 
-    `actions` counts those that came, `clipped` those of which at least one component was cut: what is cut is noise
-    that the message loses.
+    `actions` counts all actions, `clipped` those of which at least one component was clipped: clipping removes noise
+    and so weakens the message.
     """
 
     def __init__(self, low: ArrayLike, high: ArrayLike) -> None:
@@ -21,9 +21,9 @@ class ActionBounds:
             raise MtmError("a lower bound of the actions is above its upper one; give low <= high")
 
     def clip(self, actions: Floats) -> Floats:
-        """One action (axes,) or several (envs, axes) within the bounds; raises MtmError when one is not finite."""
+        """`actions`, (axes,) or (envs, axes), clipped to the bounds; raises MtmError when one is not finite."""
         if not np.all(np.isfinite(actions)):
-            raise MtmError("an action is not finite, so it goes nowhere; look for what the policy was fed")
+            raise MtmError("an action is not finite and is not applied; check the inputs of the policy")
         within: Floats = np.clip(actions, self._low, self._high)
         cut = np.any(within != actions, axis=-1)
         self.actions += cut.size
@@ -32,5 +32,5 @@ class ActionBounds:
 
     @property
     def clipped_share(self) -> float:
-        """Part of the actions that was cut, 0 before any."""
+        """Share of the actions that were clipped, 0 before the first."""
         return self.clipped / self.actions if self.actions else 0.0

@@ -1,4 +1,4 @@
-"""A Gymnasium environment whose actions get the message's noise added."""
+"""A Gymnasium environment that adds the message's noise to its actions."""
 
 from functools import cache
 from typing import Any

@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 
 class KeyedNoise:
-    """Unit-variance noise of a step's action, shape (axes,), one step a call.
+    """The unit-variance noise of each step's action, shape (axes,); one call is one step.
 
     Each of `modulators` plays one channel. `axes` name the action's components in order, by default the channels' own.
     Where no message is being sent, on components that no channel has and in silence, the noise is `random`'s, or zero
@@ -47,7 +47,7 @@ class KeyedNoise:
         self._tick = count().__next__ if tick is None else tick
 
     def __call__(self) -> Floats:
-        """The noise of this step; computes ahead what later ones need, which takes milliseconds once a window."""
+        """The noise of this step, (axes,). Once a window it computes ahead for some milliseconds."""
         if not self.modulators:
             raise MtmError(
                 "this noise is a copy, and a copy has no key; make a KeyedNoise for each model that is loaded and one "

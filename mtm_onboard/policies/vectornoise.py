@@ -25,5 +25,5 @@ class VectorKeyedNoise:
         self.sigma: Floats = np.stack([noise.sigma for noise in noises])
 
     def __call__(self) -> Floats:
-        """The noise of this step."""
+        """The noise of this step, (envs, axes)."""
         return np.stack([noise() for noise in self.noises])

@@ -15,7 +15,7 @@ import pytest
 from hil.sensors.motion_capture import write_tum
 from hil.sensors.video import write_video
 from mtm_audit.cli import decode, main
-from mtm_audit.decoding.decode import DecodeSettings
+from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.picture import Frame
 from mtm_onboard.protocol import save_key
 from tests.audit.moving_robot import FAKE_SECRET, OTHER_SECRET, key_of, robot_track, scheme_of
@@ -74,7 +74,12 @@ def refused(answer, words):
 def test_without_a_word_about_it_the_matched_detector_decodes(audit, folder):
     code, out, _ = audit(folder / "sent", detector=None)
     assert code == 0
-    assert "log-likelihood ratio" in out
+    assert "bits for a message of this key, 13.3 are needed" in out
+    assert out.splitlines()[1].startswith("Wrong at most once in 10,000, for any robot, camera and interference")
+    head = next(line.split() for line in out.splitlines() if line.startswith("channel"))
+    assert [head[head.index("symbol") + place] for place in (1, 2)] == ["bits", "needed"]
+    rows = [line.split() for line in out.splitlines() if line.startswith("robot")]
+    assert all(float(row[6]) >= float(row[7]) == 15.9 for row in rows)
 
 
 def test_a_decode_says_the_message_first_and_then_why(audit, folder):
@@ -114,7 +119,7 @@ def test_a_missing_robot_is_named_with_what_would_help(audit, folder):
     code, out, _ = audit(folder / "sent/robot0.tum", *QUICK)
     assert code == 4
     assert out.startswith("inconclusive:")
-    assert "Not seen: symbol 1, which robot1 sends" in out
+    assert "not seen: symbol 1, which robot1 sends" in out
     assert "warning: no track shows robot1" in out
 
 
@@ -186,7 +191,7 @@ def test_an_explanation_says_where_it_failed(audit, folder):
     _, out, _ = audit(folder / "silent", *QUICK, "--explain")
     assert "verdict    FAILED: absent" in out
     _, out, _ = audit(folder / "sent/robot0.tum", *QUICK, "--explain")
-    assert "symbols    FAILED: 1 of 2 are below 95%" in out
+    assert "symbols    FAILED: 1 of 2 are not certain" in out
     assert "try: record longer" in out
 
 
@@ -256,8 +261,8 @@ def run_program(*arguments, **options):
 
 def test_control_c_during_the_work_leaves_nothing_half_done(folder, tmp_path):
     busy = run_program(
-        "decode", folder / "sent", "--key", folder / "robot.key", "--json", "--decoys", "100000",
-        "--plot", tmp_path / "decode.png",
+        "decode", folder / "sent", "--key", folder / "robot.key", "--json", "--detector",
+        "coherency", "--decoys", "10000", "--plot", tmp_path / "decode.png",
     )  # fmt: skip
     # Loading takes a moment; what comes before it must end well, too, so the exact instant does not matter.
     time.sleep(1.5)
@@ -361,6 +366,7 @@ def test_a_key_that_others_can_read_is_refused(audit, folder, tmp_path):
     [
         ("--onset", "soon"), ("--onset", "nan"), ("--onset", "inf"), ("--assign", "robot0"), ("--assign", "=red"),
         ("--assign", "robot0="), ("--assign", "robot0=a", "--assign", "robot0=b"), ("--decoys", "3"),
+        ("--decoys", "10001"),
         ("--threshold", "2"), ("--nothing",),
     ],
 )  # fmt: skip

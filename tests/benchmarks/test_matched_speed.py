@@ -6,7 +6,6 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from mtm_audit.decoding.decode import DecodeSettings
 from mtm_audit.detectors.base import Observation
 from mtm_audit.detectors.coherency import CoherencyDetector
 from mtm_audit.detectors.matched.detector import MatchedDetector
@@ -16,7 +15,7 @@ from tests.audit.moving_robot import key_of, robot_track, scheme_of
 
 pytestmark = pytest.mark.benchmark(timer=time.process_time)
 SECONDS = 60.0
-DECOYS = DecodeSettings().decoys
+DECOYS = 40
 WINDOW_TICKS = 370
 MEGABYTE = 1e6
 

@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mtm_audit.decoding.decode import DecodeSettings, decode_tracks
+from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.track import Track
 from mtm_audit.readers.motion_capture import read_csv
 from mtm_onboard.protocol import Key, load_key
 
 SCRIPT = Path(__file__).parents[2] / "examples" / "policy_noise.py"
 FAKE_SECRET = b"not a real secret, only for test"
-KNOWN = DecodeSettings(onset_s=0.0, decoys=30)
+KNOWN = DecodeSettings(onset_s=0.0)
 
 
 @pytest.fixture(scope="module")

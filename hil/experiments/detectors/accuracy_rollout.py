@@ -1,4 +1,4 @@
-"""One rollout of the RoboMaster fleet under any scheme: which symbols each channel, alone or pooled, has right."""
+"""One rollout of the RoboMaster fleet under any scheme: the symbols that each channel, alone or pooled, gets right."""
 
 import itertools
 import tomllib
@@ -41,10 +41,10 @@ def rollout_parameters(scheme: Scheme, detector: str, plant: MecanumParameters) 
 
 
 def read_rollout(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """Send random symbols with a key of its own and decode each window, with the onset known.
+    """The number of correct symbols by channel name, and whether the `WHOLE` message was correct (1 or 0).
 
-    Gives the number of symbols right by channel name, and whether the `WHOLE` message was (1 or 0). Channels with as
-    many symbols as each other appear pooled too, as they would decode had all sent the same.
+    Each rollout sends random symbols under a key of its own, and its onset is known. Channels with equally many symbols
+    are also pooled, as if all had sent the same (a_c and a_I of the paper's "Design Space").
     """
     scheme = scheme_from_table(tomllib.loads(str(parameters["scheme"]))["scheme"])
     key = Key("sweep", np.random.default_rng([_KEYS_STREAM, seed]).bytes(32), scheme)
@@ -61,7 +61,7 @@ def read_rollout(parameters: Values, seed: int) -> dict[str, Scalar]:
 
 
 def _matched(codebook: Codebook, glimpses: Sequence[Glimpse]) -> list[Floats]:
-    """Log-likelihood ratios of each channel, (symbols, M), blind to the plant, all robots together."""
+    """For each channel (symbols, M): log-likelihood ratios, nats, without knowing the plant, all robots jointly."""
     scheme = codebook.scheme
     timing = Timing(ONSET_S, scheme.rate_hz)
     motions = [uniform_motion(glimpse, scheme.band_hz[1]) for glimpse in glimpses]
@@ -75,7 +75,7 @@ def _matched(codebook: Codebook, glimpses: Sequence[Glimpse]) -> list[Floats]:
 
 
 def _coherency(codebook: Codebook, glimpses: Sequence[Glimpse]) -> list[Floats]:
-    """The paper's scores of each channel, (symbols, M), one window at a time."""
+    """For each channel (symbols, M): the paper's coherency scores, window by window."""
     return [
         np.array(
             [
@@ -88,10 +88,10 @@ def _coherency(codebook: Codebook, glimpses: Sequence[Glimpse]) -> list[Floats]:
 
 
 def right_symbols(scheme: Scheme, scores: Sequence[Floats], sent: Mapping[str, Sequence[int]]) -> dict[str, Scalar]:
-    """How many symbols are right by channel name, and whether the `WHOLE` message is (1 or 0).
+    """The number of correct symbols by channel name, and whether the `WHOLE` message is correct (1 or 0).
 
-    `scores` (symbols, M) are of each channel in order, `sent` its symbols by name. Channels with as many symbols as
-    each other appear pooled too, as they would decode had all sent the same.
+    `scores` (symbols, M) are of each channel in order, `sent` its symbols by name. Channels with equally many symbols
+    are also pooled, as if all had sent the same.
     """
     return _right(
         scheme, [_sent_first(own, sent[name.name]) for own, name in zip(scores, scheme.channels, strict=True)]
@@ -99,10 +99,10 @@ def right_symbols(scheme: Scheme, scores: Sequence[Floats], sent: Mapping[str, S
 
 
 def _sent_first(scores: Floats, sent: Sequence[int]) -> Floats:
-    """Scores with the candidates of each window turned round until what was sent is number 0.
+    """(symbols, M): scores with the candidates of each window rotated so that the symbol sent is number 0.
 
-    Waveforms of different channels and symbols are independent, so which candidates are pooled with each other makes
-    no difference: channels that sent different symbols then show how they would decode the same one.
+    Waveforms of different channels and symbols are independent, so it makes no difference which candidates are pooled:
+    channels that sent different symbols then decode as if they had sent the same one.
     """
     return np.array([np.roll(row, -symbol) for row, symbol in zip(scores, sent, strict=True)])
 

@@ -1,4 +1,4 @@
-"""The benchmark: the paper's detector, the matched one and the genie on the same recordings.
+"""The benchmark: the paper's detector, the matched one and the genie (the oracle) on the same recordings.
 
 Two jobs: the paper's (one 2-bit symbol a robot) over the window length, and sustained sending (eight symbols in a row
 of a larger alphabet); both at one window length over sigma as well.
@@ -11,8 +11,8 @@ from rich.console import Console
 
 from hil.experiments.detectors.bench_recording import Job
 from hil.experiments.detectors.bench_rollout import COHERENCY, GENIE, MATCHED, read_rollout, rollout_parameters
-from hil.experiments.detectors.paper_robomaster import Proportion
 from hil.experiments.runs.cells import Cell, CellStore, Values
+from hil.experiments.runs.proportion import Proportion
 from hil.experiments.runs.sweep import run_sweep
 from hil.plants.mecanum import MecanumParameters
 from hil.worlds.robomaster import ROBOTS
@@ -40,7 +40,7 @@ class Condition:
 
 @dataclass(frozen=True)
 class Row:
-    """What one detector had right in one job; a message is all that the robots of a rollout send."""
+    """One detector's correct symbols and messages in one job; a message is all that the robots of a rollout send."""
 
     job: Job
     detector: str
@@ -50,7 +50,7 @@ class Row:
 
 
 def conditions(rollouts: int) -> list[Condition]:
-    """All of them, the most telling first; the paper's detector reads a tenth of what would take it long."""
+    """All conditions, the most informative first; the paper's detector reads a tenth of the slow ones."""
     tenth = -(-rollouts // 10)
     over_ticks = [Condition(replace(_PAPER, window_ticks=ticks), rollouts, rollouts) for ticks in _TICKS]
     return [
@@ -65,7 +65,7 @@ def conditions(rollouts: int) -> list[Condition]:
 
 
 def quick_conditions() -> list[Condition]:
-    """A few of each kind, in seconds."""
+    """A few conditions of each kind, which take seconds."""
     jobs = (_PAPER, replace(_PAPER, window_ticks=300), replace(_PAPER, sigma=0.04), Job(16, 50, 4, PAPER_SIGMA))
     return [Condition(job, _QUICK_ROLLOUTS, _QUICK_ROLLOUTS) for job in jobs]
 
@@ -79,7 +79,7 @@ def measure(
     silences: int,
     workers: int | None = None,
 ) -> list[Row]:
-    """Measure all detectors under the given conditions; `silences` teach the genie the interference."""
+    """The rows of all detectors under the conditions; the genie's interference is fitted to `silences` recordings."""
     groups = [
         [_cell(condition, plant, silences, number) for number in range(condition.rollouts)] for condition in asked
     ]

@@ -1,4 +1,4 @@
-"""The recordings of the benchmark: what is sent in one, and what each detector is shown of it."""
+"""The recordings of the benchmark: what is sent in one, and what each detector observes of it."""
 
 from dataclasses import dataclass, replace
 
@@ -48,8 +48,10 @@ class Job:
 
 @dataclass(frozen=True)
 class Recording:
-    """One rollout. `seen`: each robot's motion up to the message's end; `longer`: the same and a quarter of the
-    message more. `symbols` (robots, windows) is what was sent.
+    """One rollout.
+
+    `symbols` (robots, windows) were sent; `seen` is each robot's motion up to the message's end, `longer` up to a
+    quarter of the message after that, as the lowest rate of the paper's detector needs.
     """
 
     codebook: Codebook
@@ -59,10 +61,10 @@ class Recording:
 
 
 def record(job: Job, plant: MecanumParameters, seed: int, modulator: ModulatorFactory = Modulator) -> Recording:
-    """Run a rollout with a key of its own.
+    """A rollout with a key of its own.
 
-    One window a robot: the paper's task, in which the robots' symbols are the numbers of the targets that they drive
-    to. More: symbols at random.
+    With one window a robot it is the paper's experiment (tab:robomaster-indep), in which each robot's symbol is the
+    number of the target that it drives to; with more windows the symbols are random.
     """
     key = Key("bench", np.random.default_rng([_KEYS_STREAM, seed]).bytes(32), job.scheme)
     symbols = seeds_of(seed).permutation() if job.windows == 1 else _random_symbols(job, seed)
@@ -91,7 +93,7 @@ def glimpses_of(settings: RunSettings) -> tuple[Glimpse, ...]:
 
 
 def until(end_s: float, glimpse: Glimpse) -> Glimpse:
-    """The part of a glimpse up to `end_s`, with a hair of slack for times that are sums of decimal fractions."""
+    """The part of a glimpse up to `end_s`, with a tolerance of 1 us for rounding."""
     count = int(np.searchsorted(glimpse.edges_s, end_s + 1e-6)) - 1
     return replace(
         glimpse,

@@ -1,6 +1,5 @@
 """The benchmark's rows as a table, a file and a picture."""
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +10,8 @@ from rich.table import Table
 
 from hil.experiments.detectors.bench import DETECTORS, PAPER_SIGMA, Row
 from hil.experiments.detectors.bench_rollout import COHERENCY, GENIE, MATCHED
-from hil.experiments.detectors.paper_robomaster import Proportion
+from hil.experiments.runs.proportion import Proportion
+from hil.experiments.runs.result_file import write_result_csv
 from mtm_onboard.protocol.atomicfile import replacing
 
 _COLUMNS = ("alphabet_size", "window_ticks", "windows", "sigma", "detector", "rollouts")
@@ -21,7 +21,7 @@ _LABELS = {COHERENCY: "coherency (the paper's)", MATCHED: "matched (blind)", GEN
 
 
 def rich_table(rows: Sequence[Row]) -> Table:
-    """One line a job and detector; percent with exact 95 % intervals."""
+    """One row for each job and detector; percent with exact 95 % intervals."""
     table = Table(
         title="RoboMaster, four robots; percent with exact 95 % intervals", box=None, padding=(0, 1, 0, 0),
         pad_edge=False,
@@ -39,14 +39,10 @@ def rich_table(rows: Sequence[Row]) -> Table:
     return table
 
 
-def write_csv(path: Path, rows: Sequence[Row], comments: Sequence[str]) -> None:
-    """Write the rows after the comments, of which the first is the command line."""
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(f"# {comment}\n" for comment in comments)
-        writer = csv.writer(file, lineterminator="\n")
-        shares = [f"{share}{end}" for share in ("symbol", "message") for end in ("s", "s_correct", *_ends("_percent"))]
-        writer.writerow((*_COLUMNS, *shares))
-        writer.writerows(_csv_cells(row) for row in _ordered(rows))
+def write_csv(path: Path, rows: Sequence[Row], command: str, notes: Sequence[str]) -> None:
+    """Write the rows under the command line and the notes."""
+    shares = [f"{share}{end}" for share in ("symbol", "message") for end in ("s", "s_correct", *_ends("_percent"))]
+    write_result_csv(path, command, (*_COLUMNS, *shares), (_csv_row(row) for row in _ordered(rows)), notes)
 
 
 def draw_plot(path: Path, rows: Sequence[Row]) -> None:
@@ -94,13 +90,13 @@ def _ends(name: str) -> tuple[str, str, str]:
     return name, f"{name}_low", f"{name}_high"
 
 
-def _csv_cells(row: Row) -> tuple[object, ...]:
+def _csv_row(row: Row) -> tuple[object, ...]:
     job = row.job
     given = (job.alphabet_size, job.window_ticks, job.windows, job.sigma, row.detector, row.rollouts)
-    return (*given, *_share_cells(row.symbols), *_share_cells(row.messages))
+    return (*given, *_share_fields(row.symbols), *_share_fields(row.messages))
 
 
-def _share_cells(share: Proportion) -> tuple[object, ...]:
+def _share_fields(share: Proportion) -> tuple[object, ...]:
     return share.trials, share.successes, *(f"{value:.2f}" for value in (share.percent, *share.interval_percent))
 
 

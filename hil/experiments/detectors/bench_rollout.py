@@ -1,4 +1,4 @@
-"""One recording, read by the paper's detector, the matched one and the genie."""
+"""One recording, read by the paper's detector, the matched one and the genie (the oracle, see genie.py)."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, fields
@@ -11,8 +11,8 @@ from hil.experiments.detectors.genie import (
     Interference,
     expected_motion,
     fit_interference,
-    heard_cells,
     log_likelihoods,
+    responding_bins,
     tick_responses,
 )
 from hil.experiments.runs.cells import Scalar, Values
@@ -31,12 +31,12 @@ _SILENT_SEED = 2_000_000
 
 
 def rollout_parameters(job: Job, plant: MecanumParameters, silences: int, *, coherency: bool) -> dict[str, Scalar]:
-    """Parameters of a cell for `read_rollout`; `silences`: recordings that the genie learns the interference from."""
+    """Parameters of a cell for `read_rollout`; the genie's interference is fitted to `silences` recordings."""
     return {**asdict(job), "silences": silences, "coherency": coherency, **asdict(plant)}
 
 
 def read_rollout(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """Record one rollout and read it: how many of its symbols each detector has right, by the detector's name."""
+    """The number of symbols that each detector has right in one rollout, by the detector's name."""
     job = job_of(parameters)
     plant = plant_of(parameters)
     recording = record(job, plant, seed)
@@ -74,7 +74,7 @@ def read_coherency(job: Job, recording: Recording) -> Integers:
 
 
 def read_matched(job: Job, recording: Recording) -> Integers:
-    """Symbols (robots, windows) by the matched detector, blind to the plant, all robots together."""
+    """Symbols (robots, windows) by the matched detector, without knowing the plant, all robots jointly."""
     timing = Timing(ONSET_S, job.scheme.rate_hz)
     motions = _motions(recording.seen, job.scheme)
     windows = [
@@ -87,7 +87,7 @@ def read_matched(job: Job, recording: Recording) -> Integers:
 
 
 def read_genie(job: Job, plant: MecanumParameters, recording: Recording, interference: Interference) -> Integers:
-    """Symbols (robots, windows) by the genie, who knows every other window's symbol."""
+    """Symbols (robots, windows) by the genie, which is given every other window's symbol."""
     motions = _motions(recording.seen, job.scheme)
     ticks, rate_hz = job.window_ticks, job.scheme.rate_hz
     responses = [
@@ -101,9 +101,9 @@ def read_genie(job: Job, plant: MecanumParameters, recording: Recording, interfe
         added = [expected_motion(*pair, job.sigma) for pair in zip(responses, played, strict=True)]
         unexplained = motion.velocities - np.sum(added, axis=0)
         for window, response in enumerate(responses):
-            cells = heard_cells(response)
-            residual = (unexplained + added[window])[:, cells]
-            candidates = expected_motion(response[cells], waveforms, job.sigma)
+            bins = responding_bins(response)
+            residual = (unexplained + added[window])[:, bins]
+            candidates = expected_motion(response[bins], waveforms, job.sigma)
             decided[robot, window] = np.argmax(log_likelihoods(residual, candidates, interference))
     return decided
 
@@ -113,12 +113,12 @@ def _motions(glimpses: Sequence[Glimpse], scheme: Scheme) -> list[Motion]:
 
 
 def silent_motions(seconds: float, plant: MecanumParameters, silences: int) -> list[Motion]:
-    """Motion of that length without a message: all robots of so many recordings, none of which is reported."""
+    """Motions of that length without a message: all robots of `silences` recordings, on none of which is measured."""
     recordings = [record_silence(seconds, plant, _SILENT_SEED + number) for number in range(silences)]
     return [motion for recording in recordings for motion in _motions(recording, fleet_scheme())]
 
 
 @lru_cache(maxsize=64)
 def learned_interference(seconds: float, plant: MecanumParameters, silences: int) -> Interference:
-    """What the genie knows of recordings of that length."""
+    """The interference that the genie is given for recordings of that length."""
     return fit_interference(silent_motions(seconds, plant, silences))

@@ -1,4 +1,4 @@
-"""What the benchmark's rows say: the shortest window and the faintest noise that each detector makes do with."""
+"""The benchmark in sentences: the shortest window and the weakest noise that each detector needs."""
 
 import math
 from collections.abc import Sequence
@@ -12,8 +12,8 @@ from mtm_audit.model.track import Floats
 
 
 def summary(rows: Sequence[Row]) -> list[str]:
-    """One sentence a line."""
-    return [*_shortest_windows(rows), *_faintest_noises(rows)]
+    """The sentences, one a line."""
+    return [*_shortest_windows(rows), *_weakest_noises(rows)]
 
 
 def _shortest_windows(rows: Sequence[Row]) -> list[str]:
@@ -35,7 +35,7 @@ def shortest_window(rows: Sequence[Row], detector: str, percent: float) -> int |
     return min((row.job.window_ticks for row in mine if row.messages.percent >= percent), default=None)
 
 
-def _faintest_noises(rows: Sequence[Row]) -> list[str]:
+def _weakest_noises(rows: Sequence[Row]) -> list[str]:
     lines = []
     for job in dict.fromkeys(_without_sigma(row.job) for row in rows):
         alike = [row for row in rows if _without_sigma(row.job) == job]
@@ -72,7 +72,7 @@ def _sigma_sentence(name: str, messages: bool, percent: float, sigmas: dict[str,
 
 
 def crossing(sigmas: Floats, percents: Floats, level: float) -> float:
-    """Where accuracy that can only rise with sigma reaches `level`; nan when it does not within the range measured.
+    """The sigma at which accuracy, taken as increasing in sigma, reaches `level`; nan outside the range measured.
 
     `sigmas` ascending; the accuracies are made monotone by isotonic regression and interpolated over log sigma.
     """
@@ -86,7 +86,7 @@ def crossing(sigmas: Floats, percents: Floats, level: float) -> float:
 
 
 def isotonic(values: Floats) -> Floats:
-    """The rising sequence nearest to `values` in least squares, by the max-min formula."""
+    """The non-decreasing sequence nearest to `values` in least squares (max-min formula of isotonic regression)."""
     count = len(values)
     means = np.array(
         [

@@ -1,7 +1,7 @@
-"""Fitting the plant's slip to the paper's margins on hardware, with the paper's own detector.
+"""Fitting the plant's slip to the paper's margins on hardware (tab:robomaster-indep), with the paper's own detector.
 
-Everything else about the plant is set by hand. The margin is a finer measure than the accuracy, which is 100 % at most
-window lengths and so says little.
+All other parameters of the plant are set by hand. The margin is the finer measure: the accuracy is 100 % at most window
+lengths.
 """
 
 import math
@@ -55,7 +55,7 @@ def scan(
     message_ticks: Sequence[int] = tuple(MARGINS),
     workers: int | None = None,
 ) -> list[Candidate]:
-    """Run every slip on the same seeds and return the candidates in the order of `slips_mps`."""
+    """The candidates in the order of `slips_mps`, each run on the same seeds."""
     cells = {
         (slip, ticks): [_cell(replace(plant, slip_mps=slip), ticks, FIRST_SEED + number) for number in range(rollouts)]
         for slip in slips_mps

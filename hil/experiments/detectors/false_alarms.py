@@ -1,8 +1,9 @@
 """How often a verdict is wrong when there is nothing to read: wrong keys, and recordings without a message.
 
-One cell is one rollout of four robots, each decoded by itself under a key that its motion does not carry, or in one
-cell of many all together, in tracks whose names say nothing. Schemes, lengths of the recording, where in the task it
-begins, what each robot is busy with, the view and the frames differ from cell to cell, all drawn from the cell's seed.
+These are the paper's null conditions (Section "Null Conditions", tab:null) under varied circumstances. One cell is one
+rollout of four robots, each decoded by itself under a key that its motion does not carry; in one cell of sixteen all
+are decoded together, from tracks that do not name the robots. Scheme, length of the recording, where in the task it
+begins, the robots' tasks, the camera and the frame times are drawn from the cell's seed.
 """
 
 import math
@@ -19,8 +20,8 @@ from hil.fleet.rig import RunSettings
 from hil.plants.mecanum import calibrated_parameters
 from hil.sensors.motion_capture import MotionCapture
 from hil.sensors.optics import Optics
-from hil.worlds.errands import any_errand
 from hil.worlds.robomaster import ROBOTS, fleet_scheme
+from hil.worlds.tasks import random_task
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.track import Floats, Track
@@ -39,7 +40,7 @@ _FLEET_LONGEST_WINDOWS = 1.5
 
 @dataclass(frozen=True)
 class Summary:
-    """One arm: `p_values` (decodes,), and how many were called decoded and how many inconclusive.
+    """One arm: `p_values` (decodes,), and the number of verdicts "decoded" and "inconclusive".
 
     `uniformity` is the Kolmogorov-Smirnov p-value of the p-values against a uniform law.
     """
@@ -52,7 +53,7 @@ class Summary:
 
 
 def false_alarm_cells(arm: str, decodes: int, detector: str, first_seed: int) -> list[Cell]:
-    """As many rollouts as give at least `decodes` decodes; one that decodes the whole fleet at once gives one."""
+    """Cells with at least `decodes` decodes in total; one that decodes the whole fleet together has one decode."""
     cells: list[Cell] = []
     while decodes > 0:
         seed = first_seed + len(cells)
@@ -62,7 +63,7 @@ def false_alarm_cells(arm: str, decodes: int, detector: str, first_seed: int) ->
 
 
 def decode_nothing(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """Run one rollout and decode what is not in its motion: p-value and verdict of each decode."""
+    """P-value and verdict of each decode of one rollout, whose motion does not carry what is decoded."""
     draw = np.random.default_rng([_STREAM, seed])
     scheme = replace(fleet_scheme(int(draw.choice(_WINDOWS_TICKS))), alphabet_size=int(draw.choice(_ALPHABETS)))
     symbols = tuple(int(symbol) for symbol in draw.integers(0, scheme.alphabet_size, ROBOTS))
@@ -84,7 +85,7 @@ def _is_fleet(seed: int) -> bool:
 
 
 def _asked(scheme: Scheme, tracks: Sequence[Track], seed: int) -> list[tuple[Scheme, list[Track]]]:
-    """What is decoded: each robot by itself, or all in nameless tracks."""
+    """What is decoded: each robot by itself, or all together from tracks that do not name them."""
     if _is_fleet(seed):
         return [
             (scheme, [replace(track, name=f"shape {letter}") for letter, track in zip("abcd", tracks, strict=True)])
@@ -93,24 +94,24 @@ def _asked(scheme: Scheme, tracks: Sequence[Track], seed: int) -> list[tuple[Sch
 
 
 def _recorded(played: Key, sent: tuple[int, ...] | None, seed: int, draw: np.random.Generator) -> list[Track]:
-    """A piece of what a camera makes of one rollout; a single camera for all."""
+    """The tracks of a part of one rollout in the picture of one camera."""
     window_s = played.scheme.message_ticks / played.scheme.rate_hz
     most_s = _FLEET_LONGEST_WINDOWS * window_s if _is_fleet(seed) else min(_LONGEST_S, 4.0 * window_s)
     length_s = float(draw.uniform(window_s, max(1.2 * window_s, most_s)))
     begin_s = float(draw.uniform(0.3, 8.0))
     settings = RunSettings(
-        played, sent, begin_s + length_s + 0.2, seed, wire="direct", start_s=0.2, task=any_errand,
+        played, sent, begin_s + length_s + 0.2, seed, wire="direct", start_s=0.2, task=random_task,
         plant=calibrated_parameters(),
     )  # fmt: skip
     rate_hz, dropouts = float(draw.choice((25.0, 30.0, 50.0, 100.0))), float(draw.choice((0.0, 0.05)))
     system = MotionCapture(rate_hz=rate_hz, dropout_probability=dropouts)
     tracks = motion_capture_tracks(run_lockstep(settings), seed, system)
     camera = _camera(draw)
-    return [_seen(_cut(track, begin_s, begin_s + length_s), camera, draw) for track in tracks]
+    return [_observed_track(_cut(track, begin_s, begin_s + length_s), camera, draw) for track in tracks]
 
 
 def summarise(arm: str, results: Sequence[Values]) -> Summary:
-    """Collect an arm's decodes."""
+    """The decodes of an arm together."""
     p_values = np.array([float(value) for result in results for name, value in result.items() if name[0] == "p"])
     verdicts = [str(value) for result in results for name, value in result.items() if name[0] == "v"]
     uniformity = float(stats.kstest(p_values, "uniform").pvalue)
@@ -138,7 +139,7 @@ def _camera(draw: np.random.Generator) -> Optics:
     return Optics(position_m, target_m, _PIXELS_PER_M * distance_m, roll_rad=roll_rad, mirrored=mirrored)
 
 
-def _seen(track: Track, camera: Optics, draw: np.random.Generator) -> Track:
+def _observed_track(track: Track, camera: Optics, draw: np.random.Generator) -> Track:
     """The track in the picture, y up, with the tracker's noise."""
     ground = np.column_stack([track.positions, np.zeros(len(track.positions))])
     pixels = camera.project(ground) * [1.0, -1.0]

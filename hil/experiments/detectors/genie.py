@@ -1,7 +1,13 @@
-"""The limit for any detector: one that is told everything but the symbol in question.
+"""The genie: an oracle detector, whose accuracy no detector of the same recordings can exceed by much.
 
-It knows the plant to the last millisecond, which axis moves what and how strongly, the statistics of the interference
-(fitted on many recordings without a message), and what every other window carries.
+In information theory a genie-aided receiver is given side information that a real one does not have. Here that is
+everything except the symbol in question: the plant with its delay and lag, which axis moves what and by how much, the
+statistics of the interference (fitted to recordings without a message, which are not measured on), and the symbols of
+all other windows. It then compares the likelihoods of the M candidates. This word is used in code, tables and
+documents in this sense alone; `hil.experiments.worlds.genie` is the same for worlds whose plant has no formula and is
+fitted instead.
+
+A recording is divided into uniform time bins of the detectors' `Motion`.
 """
 
 from collections.abc import Sequence
@@ -17,25 +23,25 @@ from mtm_audit.model.track import Floats
 
 ORDER = 8
 _DEGREES_OF_FREEDOM = 5.0
-_INAUDIBLE = 1e-4
+_NEGLIGIBLE = 1e-4
 
 
 @dataclass(frozen=True)
 class Interference:
-    """`filter` (order + 1,): whitening filter, first coefficient 1; `scales` (axes,): of the innovations."""
+    """`filter` (order + 1,): whitening filter, first coefficient 1; `scales` (axes,): the innovations' scales, m/s."""
 
     filter: Floats
     scales: Floats
 
 
 def fit_interference(silences: Sequence[Motion]) -> Interference:
-    """Fit motion without a message, many recordings at once."""
+    """The interference's statistics, fitted to many motions without a message."""
     noise = fit_noise([motion.velocities for motion in silences], [motion.seen for motion in silences], ORDER)
     return Interference(noise.filter, np.sqrt(np.mean(np.square(noise.scales), axis=0)))
 
 
 def tick_responses(plant: MecanumParameters, onset_s: float, rate_hz: float, ticks: int, motion: Motion) -> Floats:
-    """Mean velocity in each cell of `motion` for a command of 1 m/s held over one tick: (cells, ticks)."""
+    """(bins, ticks): mean velocity, m/s, in each time bin of `motion` for a command of 1 m/s held over one tick."""
     edges_s = motion.start_s + np.arange(len(motion.seen) + 1) * motion.step_s
     since_s = edges_s[:, None] - (onset_s + np.arange(ticks) / rate_hz)
     moved_m = _step_displacement_m(plant, since_s) - _step_displacement_m(plant, since_s - 1.0 / rate_hz)
@@ -44,7 +50,7 @@ def tick_responses(plant: MecanumParameters, onset_s: float, rate_hz: float, tic
 
 
 def _step_displacement_m(plant: MecanumParameters, since_s: Floats) -> Floats:
-    """How far the chassis has come `since_s` after a command of 1 m/s from rest."""
+    """Displacement, m, of the chassis `since_s` after a command of 1 m/s from rest."""
     # The motion controller hands a command on one period after it came; the physics takes each step at the velocity
     # of the step's end.
     driven_s = np.maximum(0.0, since_s - SAMPLE_PERIOD_S - plant.delay_s + 0.5 * plant.step_s)
@@ -52,21 +58,23 @@ def _step_displacement_m(plant: MecanumParameters, since_s: Floats) -> Floats:
 
 
 def expected_motion(responses: Floats, samples: Floats, sigma: float) -> Floats:
-    """What waveforms (..., ticks) of unit variance add to the motion: (..., cells)."""
+    """(..., bins): velocity, m/s, that unit-variance waveforms (..., ticks) add to the motion."""
     return np.asarray(sigma * samples @ responses.T)
 
 
-def heard_cells(responses: Floats) -> slice:
-    """The cells in which whitened candidates can differ: those that hear the window, and the filter's order around."""
-    loudest = np.max(np.abs(responses), axis=1)
-    heard = np.flatnonzero(loudest > _INAUDIBLE * loudest.max())
-    return slice(max(0, int(heard[0]) - ORDER), int(heard[-1]) + ORDER + 1)
+def responding_bins(responses: Floats) -> slice:
+    """The time bins in which whitened candidates differ: those that respond, and `ORDER` on either side."""
+    strongest = np.max(np.abs(responses), axis=1)
+    bins = np.flatnonzero(strongest > _NEGLIGIBLE * strongest.max())
+    return slice(max(0, int(bins[0]) - ORDER), int(bins[-1]) + ORDER + 1)
 
 
 def log_likelihoods(residual: Floats, candidates: Floats, interference: Interference) -> Floats:
-    """Of each candidate, up to a common constant: `residual` (axes, n), `candidates` (M, axes, n), to (M,).
+    """(M,): log-likelihood, nats, of each candidate up to a common constant.
 
-    The innovations follow Student's t: turns are outliers, and a Gaussian law has more symbols wrong.
+    `residual` (axes, n) is the motion without every other window's noise, `candidates` (M, axes, n) what each symbol
+    would add, both m/s. Innovations follow Student's t, since turns of the task are outliers: with a Gaussian law more
+    symbols are wrong.
     """
     errors = whitened(residual - candidates, interference.filter) / interference.scales[:, None]
     total: Floats = -0.5 * (_DEGREES_OF_FREEDOM + 1.0) * np.sum(np.log1p(errors**2 / _DEGREES_OF_FREEDOM), axis=(1, 2))

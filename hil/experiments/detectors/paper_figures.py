@@ -1,4 +1,4 @@
-"""The paper's RoboMaster figures, to be printed next to ours (its tables "RoboMaster" and "Null conditions")."""
+"""The paper's RoboMaster figures, printed beside ours (tab:robomaster-indep and tab:null)."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The paper's RoboMaster table and its null conditions, measured on the simulated fleet."""
+"""The paper's RoboMaster table and its null conditions (tab:robomaster-indep, tab:null), on the simulated fleet."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,36 +12,13 @@ from hil.experiments.detectors import paper_figures
 from hil.experiments.detectors.paper_figures import PaperFigure
 from hil.experiments.detectors.robomaster_rollout import NO_MESSAGE, SENT, WRONG_KEY, decode_rollout, rollout_parameters
 from hil.experiments.runs.cells import Cell, CellStore, Values
-from hil.experiments.runs.commented_csv import write_commented_csv
-from hil.experiments.runs.intervals import clopper_pearson
+from hil.experiments.runs.proportion import Proportion
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 from hil.plants.mecanum import MecanumParameters
 
 # Wrong keys that try each rollout: with 40 rollouts of four robots as many decodes as in the paper.
 DECOYS = 10
-
-
-@dataclass(frozen=True)
-class Proportion:
-    """Successes out of trials."""
-
-    successes: int
-    trials: int
-
-    @property
-    def percent(self) -> float:
-        """100 times the share of successes."""
-        return 100.0 * self.successes / self.trials
-
-    @property
-    def interval_percent(self) -> tuple[float, float]:
-        """Exact 95 % interval, which takes the trials for independent."""
-        low, high = clopper_pearson(self.successes, self.trials)
-        return 100.0 * low, 100.0 * high
-
-    def __str__(self) -> str:
-        low, high = self.interval_percent
-        return f"{self.percent:.1f} [{low:.0f}-{high:.0f}]"
 
 
 @dataclass(frozen=True)
@@ -67,7 +44,7 @@ def measure(
     conditions: Sequence[tuple[str, int]] | None = None,
     workers: int | None = None,
 ) -> list[Row]:
-    """Measure all rows, or those of the given (arm, T); seeds count from 0."""
+    """All rows, or those of the given (arm, T), measured; seeds count from 0."""
     asked = _all_conditions() if conditions is None else conditions
     groups = [[_cell(plant, arm, ticks, seed) for seed in range(rollouts)] for arm, ticks in asked]
     results = run_sweep(decode_rollout, [cell for group in groups for cell in group], store, console, workers)
@@ -118,16 +95,16 @@ def rich_table(rows: Sequence[Row]) -> Table:
     return table
 
 
-def write_csv(path: Path, rows: Sequence[Row], comments: Sequence[str]) -> None:
-    """Write the rows after the comments, of which the first is the command line."""
+def write_csv(path: Path, rows: Sequence[Row], command: str, notes: Sequence[str]) -> None:
+    """Write the rows under the command line and the notes."""
     columns = ("arm", "message_ticks", "rollouts", "symbols", "symbols_correct", "symbol_percent", "symbol_percent_low",
              "symbol_percent_high", "paper_symbol_percent", "messages_correct", "message_percent",
              "message_percent_low", "message_percent_high", "paper_message_percent", "margin",
              "margin_standard_error", "paper_margin")  # fmt: skip
-    write_commented_csv(path, comments, columns, (_csv_cells(row) for row in rows))
+    write_result_csv(path, command, columns, (_csv_row(row) for row in rows), notes)
 
 
-def _csv_cells(row: Row) -> tuple[object, ...]:
+def _csv_row(row: Row) -> tuple[object, ...]:
     low, high = row.symbols.interval_percent
     messages: tuple[object, ...] = ("", "", "", "")
     if row.messages is not None:

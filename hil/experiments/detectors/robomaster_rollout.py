@@ -1,4 +1,4 @@
-"""One rollout of the paper's RoboMaster experiment, decoded with the paper's detector.
+"""One rollout of the paper's RoboMaster experiment (appendix "RoboMaster: Numerical Results"), decoded by its detector.
 
 Each rollout draws a key and a permutation of its own; the robots' symbols are the numbers of the targets that they
 drive to. The auditor has motion capture and knows when the message began.
@@ -34,10 +34,9 @@ def rollout_parameters(arm: str, message_ticks: int, plant: MecanumParameters, d
 
 
 def decode_rollout(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """Run and decode one rollout.
+    """`decodes` of one rollout, how many of them were `correct`, and the mean `margin`.
 
-    Result: `decodes` and how many of them were `correct`; `margin`, the score of the robot's symbol minus that of the
-    best other, as a mean over decodes.
+    The margin of a decode is the score of the robot's symbol minus that of the best other.
     """
     given = dict(parameters)
     arm, ticks, decoys = str(given.pop("arm")), int(given.pop("message_ticks")), int(given.pop("decoys"))

@@ -1,4 +1,4 @@
-"""The matched detector under views, frames and clocks that nobody calibrated.
+"""The matched detector under uncalibrated cameras, frame times and clocks.
 
 One cell is one rollout of four robots that repeat their symbols, seen under one condition. Tracks are true projections
 of the robots through a camera, with the noise of a tracker; a condition changes one thing at a time.
@@ -42,9 +42,10 @@ JOBS = (Job(4, 150, 1), Job(256, 100, 8))
 
 @dataclass(frozen=True)
 class Condition:
-    """What differs from a plain overhead camera at 30 frames a second, whose clock and start are known.
+    """How a recording differs from that of an overhead camera at 30 frames a second whose clock and start are known.
 
-    `intervals_s` bounds the time between frames; `hidden_s` is how long each robot is occluded, once.
+    `intervals_s` bounds the time between frames, `dropped` is the share of lost frames, `hidden_s` the length of each
+    robot's one occlusion, `clock` the camera's seconds per second.
     """
 
     optics: Optics
@@ -72,7 +73,7 @@ CONDITIONS: dict[str, Condition] = {
 
 
 def read_under(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """Record one rollout, look at it under one condition, and count the windows read and those read right."""
+    """The number of windows `read` and of those `right` in one rollout recorded under one condition."""
     condition = CONDITIONS[str(parameters["condition"])]
     draw = np.random.default_rng([_STREAM, seed])
     job = Job(int(parameters["alphabet_size"]), int(parameters["ticks"]), int(parameters["windows"]))
@@ -89,7 +90,7 @@ def read_under(parameters: Values, seed: int) -> dict[str, Scalar]:
     settings = RunSettings(key, sent, end_s + 0.2, seed, wire="direct", start_s=_START_S, plant=calibrated_parameters())
     result = run_lockstep(settings)
     observations = [
-        Observation(channel, glimpse_of_track(_seen(trajectory, condition, begin_s, end_s, draw)))
+        Observation(channel, glimpse_of_track(_observed_track(trajectory, condition, begin_s, end_s, draw)))
         for channel, trajectory in zip(channels, result.trajectories, strict=True)
     ]
     onset_s = (_START_S - begin_s) * condition.clock
@@ -107,7 +108,7 @@ def read_under(parameters: Values, seed: int) -> dict[str, Scalar]:
     return {"read": read, "right": right}
 
 
-def _seen(
+def _observed_track(
     trajectory: Trajectory, condition: Condition, begin_s: float, end_s: float, draw: np.random.Generator
 ) -> Track:
     """The robot's track in the picture, in the recording's own clock, y up."""

@@ -1,1 +1,1 @@
-"""What a runtime must survive: faults, damaged traffic, a day without a pause, the microcontroller."""
+"""Tests of robustness: faults of a wire, damaged traffic, a day of running, the microcontroller's code."""

@@ -1,7 +1,7 @@
-"""A day of one robot in simulated time: the onboard software over the whole CAN protocol, and what it uses up.
+"""A day of one robot in simulated time: the onboard software over the whole CAN protocol, and what it consumes.
 
-The message's waveforms roll by the time of day, midnight is under way in the middle of the run, and the minute before
-each checkpoint is kept as motion, from which the message is read after the run.
+The schedule is rolling, and midnight falls into the middle of the run. The motion of the minute before each checkpoint
+is kept, and the message is decoded from it after the run.
 """
 
 import os
@@ -23,8 +23,8 @@ from hil.sensors.poses import Floats, Trajectory
 from hil.vehicles.can_node import CanMotionController
 from hil.vehicles.motion_controller import MotionController
 from hil.wires.can_line import can_line
-from hil.worlds.errands import ERRANDS
 from hil.worlds.robomaster import Route
+from hil.worlds.tasks import TASKS
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.recorded_at import RecordedAt
@@ -56,10 +56,10 @@ _FILM_SAMPLES = round(FILM_S / SAMPLE_PERIOD_S)
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """The state at `elapsed_s` of simulated time, and the message as read from the minute before.
+    """The state at `elapsed_s` of simulated time, and the message as decoded from the minute before.
 
-    `clamped` ticks met a limit, `disturbed` ones were stale, refused, held or not sent. `faults` is what either end of
-    the wire found wrong, losses of the link included. `resident_bytes` is the memory of the whole process,
+    `clamped` ticks reached a limit, `disturbed` ones were stale, refused, held or not sent. `faults` counts what either
+    end of the wire found wrong, lost links included. `resident_bytes` is the memory of the whole process,
     `journal_bytes` that of the journal's files together. `symbols_right` is how many of the message's symbols were read
     right, and `p_value` how unlikely the evidence would be without a message.
     """
@@ -87,7 +87,7 @@ def endure(
     detector: str = "matched",
     journal_bytes: int = DEFAULT_MAX_BYTES,
 ) -> list[Checkpoint]:
-    """Run for so long and report at evenly spaced checkpoints; `reached` hears the simulated time of each.
+    """The checkpoints, evenly spaced, of a run of that length; `reached` is called with the simulated time of each.
 
     Raises MtmError when checkpoints are less than a minute apart.
     """
@@ -95,7 +95,7 @@ def endure(
     if apart_s < FILM_S:
         raise MtmError(f"checkpoints are {apart_s:g} s apart; ask for fewer, so that a minute lies between them")
     begin_unix_s = _begin_unix_s(apart_s * (checkpoints // 2 or 1))
-    # Written to at once, so that no memory is taken later on.
+    # Filled at once, so that the process takes no further memory for it during the run.
     films: Floats = np.full((checkpoints, _FILM_SAMPLES, 3), np.nan)
     states = []
     with tempfile.TemporaryDirectory() as folder, _Robot(Path(folder), begin_unix_s, seed, journal_bytes) as robot:
@@ -111,7 +111,7 @@ def endure(
 
 
 def _begin_unix_s(middle_s: float) -> float:
-    """A slot's start, so that midnight is half a minute before `middle_s` of the run."""
+    """The start of a slot for which midnight falls half a minute before `middle_s` of the run."""
     return slot_start_unix_s(slot_at(_MIDNIGHT_UNIX_S - middle_s + FILM_S / 2.0, _SCHEME), _SCHEME)
 
 
@@ -124,7 +124,7 @@ class _Robot:
         ours, theirs = can_line()
         self._node = CanMotionController(MotionController(self._plant), theirs)
         self._link = ReconnectingTransport(lambda: RoboMasterCan(ours), clock)
-        self._task = ERRANDS["orbit"](Route((0.0, 0.0), ()), seed)
+        self._task = TASKS["orbit"](Route((0.0, 0.0), ()), seed)
         rate_hz = _SCHEME.rate_hz
         header = JournalHeader(
             _SCHEME.fingerprint, _KEY.id, "robot0", "robot0", SYMBOLS, True, rate_hz, 0.0, begin_unix_s
@@ -149,7 +149,7 @@ class _Robot:
                 stack.callback(release)
 
     def run_until(self, end_s: float, film: Floats) -> None:
-        """Go on to `end_s`; `film` (samples, 3) takes the poses x, y, heading of the time before it."""
+        """Run on to `end_s`; `film` (samples, 3) receives the poses x, y, heading of the time before that."""
         self._film = film
         self._film_begins = round(end_s / SAMPLE_PERIOD_S) - len(film)
         clock = self._clock
@@ -159,7 +159,7 @@ class _Robot:
         )  # fmt: skip
 
     def state(self) -> Checkpoint:
-        """Everything but what the film shows."""
+        """The checkpoint without what is decoded from the film."""
         stats, guard, journal = self._stats, self._guard, self._journal
         return Checkpoint(
             elapsed_s=self._clock.now(), ticks=stats.sent, missed=stats.missed, clamped=guard.clamped,
@@ -190,7 +190,7 @@ class _Robot:
 
 
 def _read(film: Floats, begin_unix_s: float, seed: int, detector_name: str) -> tuple[int, float]:
-    """Symbols that were read right from one film, which begins at `begin_unix_s`, and the p-value of its evidence."""
+    """The number of symbols decoded correctly from one film, which begins at `begin_unix_s`, and the p-value."""
     begin_unix_s += SAMPLE_PERIOD_S
     times_s = np.arange(len(film), dtype=np.float64) * SAMPLE_PERIOD_S
     trajectory = Trajectory("robot0", times_s, film[:, :2], film[:, 2])

@@ -1,7 +1,7 @@
 """One robot under one fault of its wire: the onboard runtime and a link that comes back, in simulated time.
 
-Ticks are calls of the clock, as the service is, so that they go on while the service waits in an opening link, as
-they do in two threads.
+Both the ticks and the link's service are called by the clock, so that ticks go on while the service waits for a link to
+open, as in two threads.
 """
 
 from collections.abc import Callable
@@ -22,8 +22,8 @@ from hil.vehicles.motion_controller import DEADMAN_S, MotionController
 from hil.vehicles.plaintext_node import PlaintextMotionController
 from hil.wires.faulty_wire import FaultyBus, FaultyPort, FaultyText, FaultyTextPort, FaultyWire, WireFaults
 from hil.wires.plaintext_line import LineTransport
-from hil.worlds.errands import ERRANDS
 from hil.worlds.robomaster import Route
+from hil.worlds.tasks import TASKS
 from mtm_onboard.journal.journal import Journal, JournalHeader
 from mtm_onboard.links.base import Transport
 from mtm_onboard.links.mavlink import MavlinkTransport
@@ -45,7 +45,7 @@ DEADMEN_S: dict[str, float | None] = {"can": DEADMAN_S, "plaintext": None, "mavl
 
 @dataclass(frozen=True)
 class Fault:
-    """What goes wrong: on the wire, and in what the robot makes of a command.
+    """A fault of the wire, and of how the robot follows a command.
 
     Commands are rounded to `grain` and held within `most`, both in m/s and rad/s on each axis.
     """
@@ -57,7 +57,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class FaultRun:
-    """What came of it.
+    """The record of a run.
 
     `in_force` are the commands that the robot's controller took up and when, its own stops included; `motion`
     (samples, 3) its true pose x, y, heading every 10 ms; `journal` what the runtime says it sent; `losses` how often
@@ -71,15 +71,15 @@ class FaultRun:
 
 
 class _ImpairedPlant(MecanumPlant):
-    """A chassis that rounds and saturates what it is told, and keeps what it was told."""
+    """A chassis that rounds and saturates commands, and records the commands that it is given."""
 
     def __init__(self, seed: int) -> None:
         super().__init__(calibrated_parameters(), seed)
-        self.told: list[tuple[float, BodyVelocity]] = []
+        self.commands: list[tuple[float, BodyVelocity]] = []
         self.fault = Fault()
 
     def command(self, now_s: float, velocity: BodyVelocity) -> None:
-        self.told.append((now_s, velocity))
+        self.commands.append((now_s, velocity))
         grain, most = self.fault.grain, self.fault.most
         rounded = [round(value / grain) * grain if grain else value for value in velocity]
         super().command(now_s, BodyVelocity(*(max(-most, min(most, value)) for value in rounded)))
@@ -87,7 +87,7 @@ class _ImpairedPlant(MecanumPlant):
 
 @dataclass(frozen=True)
 class _End:
-    """The robot's end, and how our end is made."""
+    """The robot's end of a wire, and a factory of our end."""
 
     poll: Callable[[float], None]
     make: Callable[[], Transport]
@@ -96,7 +96,7 @@ class _End:
 def run_fault(
     wire_name: str, fault: Fault, loss: str, key: Key, symbols: tuple[int, ...], seed: int, folder: Path
 ) -> FaultRun:
-    """Run it; `loss` is "", "cut" or "swallowed", and `folder` is where the journal goes."""
+    """The record of one run; `loss` is "", "cut" or "swallowed", and the journal is written into `folder`."""
     clock = SimulatedClock()
     wire, plant = FaultyWire(clock, seed), _ImpairedPlant(seed)
     end = _end(wire_name, wire, plant, clock)
@@ -111,7 +111,7 @@ def run_fault(
     with Journal(path, _header(key, symbols), threaded=False) as journal:
         ticks = _Ticks(key, symbols, link, journal, plant, seed)
         clock.every(SAMPLE_PERIOD_S, poll)
-        clock.every(link.service_period_s, _once_at_a_time(link.service))
+        clock.every(link.service_period_s, _not_reentrant(link.service))
         link.open()
         clock.every(1.0 / key.scheme.rate_hz, ticks.tick, START_S)
         clock.sleep_until(FAULT_S)
@@ -121,19 +121,19 @@ def run_fault(
             wire.cut()
         wire.swallows = loss == "swallowed"
         clock.sleep_until(FOUND_S)
-        wire.mend()
+        wire.restore()
         clock.sleep_until(END_S)
         ticks.end()
-        told = tuple(plant.told)
-        # What is blocked or down at the very end says that it could not tell the robot to stop.
+        commands = tuple(plant.commands)
+        # A link that is blocked or lost at the end raises because it cannot send the stop.
         with suppress(MtmError):
             link.stop()
         link.close()
-    return FaultRun(told, np.array(motion), read_journal(path), link.losses)
+    return FaultRun(commands, np.array(motion), read_journal(path), link.losses)
 
 
 class _Ticks:
-    """The onboard program: a controller that falls silent in the end, and the runtime."""
+    """The onboard program: the runtime, and a controller whose base commands end at `SILENT_S`."""
 
     def __init__(
         self, key: Key, symbols: tuple[int, ...], link: Transport, journal: Journal, plant: MecanumPlant, seed: int
@@ -143,7 +143,7 @@ class _Ticks:
         guard = Guard(LIMITS, Staleness(), noise_sigma=channel.sigma, period_s=1.0 / rate_hz)
         modulator = Modulator(key.codebook(), channel.name, symbols)
         self._runtime = Runtime(modulator, guard, self._source, link, journal)
-        self._task = ERRANDS["orbit"](Route((0.0, 0.0), ()), seed)
+        self._task = TASKS["orbit"](Route((0.0, 0.0), ()), seed)
         self._plant = plant
         self._rate_hz = rate_hz
         self._is_over = False
@@ -166,8 +166,8 @@ def _header(key: Key, symbols: tuple[int, ...]) -> JournalHeader:
     )
 
 
-def _once_at_a_time(service: Callable[[float], None]) -> Callable[[float], None]:
-    """As one thread would: not again while it is still waiting for something."""
+def _not_reentrant(service: Callable[[float], None]) -> Callable[[float], None]:
+    """The service without reentrance, as in a single thread."""
     is_busy = False
 
     def serve(now_s: float) -> None:

@@ -1,8 +1,8 @@
-"""The fault matrix: every fault of a wire alone and together with a lost link, on every wire, from end to end.
+"""The fault matrix: every fault of every wire, with the link kept and with the link lost, from end to end.
 
-The robot has to stand still `STALE_S` after the last base command, whatever the wire does, and after the link is lost
-within the deadman of the robot at its far end, where it has one. `GRACE_S` is a tick and two polls of the wire; a wire
-that loses, holds up or spoils messages may take `LATE_S` longer, since a stop is one of them.
+Requirements: the robot stands still `STALE_S` after the last base command whatever the wire does, and, after the link
+is lost, within the deadman time of the robot at its far end where it has one. `GRACE_S` is one tick and two polls of
+the wire; a wire that loses, delays or corrupts messages may take `LATE_S` longer, since a stop is a message too.
 """
 
 import math
@@ -56,20 +56,20 @@ LATE_S = 0.1
 
 _SYMBOLS = (3, 1)
 _WINDOW_TICKS = 200
-_SAME = 2e-4  # what plaintext rounds off, in m/s and rad/s, and a hair
+_SAME = 2e-4  # above what plaintext rounds off, in m/s and rad/s
 _MOSTLY = 0.75
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one run came to; ages and times in seconds.
+    """The measurements of one run; ages and times in seconds.
 
-    `altered` commands came into force that were never sent. `arrived_s` is the age of the oldest command with which
-    motion began, `held_s` the greatest age that a command in force reached. `lost_stop_s` is from the loss of the link
-    to the stop, -1 when the robot did not stop before the wire was whole again and 0 when there was no loss.
-    `silent_stop_s` is from the last base command to the last stop.
-    Of `windows` of the message `sent` have left the runtime for the most part, within what the robot can do;
-    `message_is_due` when these hold every symbol, and `is_decoded` when it was decoded, and right.
+    `altered`: commands that came into force but were never sent. `arrived_s`: greatest age of a command when it came
+    into force; `held_s`: greatest age of a command while in force. `lost_stop_s`: from the loss of the link to the
+    stop, -1 when the robot did not stop before the wire was restored and 0 without a loss. `silent_stop_s`: from the
+    last base command to the last stop. `windows`: windows of the message; `sent`: those of which the runtime sent at
+    least three quarters of the ticks within what the robot can do. `message_is_due`: these hold every symbol;
+    `is_decoded`: the message was decoded correctly.
     """
 
     altered: int
@@ -86,8 +86,8 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Line:
-    """One row of the matrix: an outcome beside its deadlines; `lost_deadline_s` None for a robot without a deadman."""
+class Row:
+    """One row of the matrix: an outcome and its deadlines; `lost_deadline_s` None for a robot without a deadman."""
 
     wire: str
     fault: str
@@ -99,7 +99,7 @@ class Line:
 
     @property
     def stops(self) -> bool:
-        """Whether the robot stood still by every deadline that it has."""
+        """Whether the robot stood still by every deadline."""
         outcome = self.outcome
         in_time = outcome.silent_stop_s <= self.silent_deadline_s
         if self.loss and self.lost_deadline_s is not None:
@@ -108,17 +108,17 @@ class Line:
 
     @property
     def is_fresh(self) -> bool:
-        """Whether no motion began with a stale command."""
+        """Whether no command was stale when it came into force."""
         return self.outcome.arrived_s <= STALE_S
 
     @property
     def is_read(self) -> bool:
-        """Whether the message was decoded if it was sent whole."""
+        """Whether the message was decoded, or was not sent whole."""
         return self.outcome.is_decoded or not self.outcome.message_is_due
 
 
 def fault_cells(seeds: int, first_seed: int, wires: Sequence[str] = WIRES) -> list[Cell]:
-    """Every fault with every loss on every wire."""
+    """A cell for each combination of wire, fault, loss and seed."""
     return [
         Cell("faults", {"wire": wire, "fault": fault, "loss": loss}, first_seed + number)
         for wire in wires
@@ -129,7 +129,7 @@ def fault_cells(seeds: int, first_seed: int, wires: Sequence[str] = WIRES) -> li
 
 
 def fault_cell(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """Run one cell and read its motion; the fields of an `Outcome`."""
+    """The fields of the `Outcome` of one cell: run it and decode its motion."""
     draw = np.random.default_rng([17, seed])
     fleet = fleet_scheme(len(_SYMBOLS) * _WINDOW_TICKS)
     scheme = replace(fleet, channels=(Channel("robot0", "robot0", ("vx", "vy"), len(_SYMBOLS), 0.1),))
@@ -142,20 +142,20 @@ def fault_cell(parameters: Values, seed: int) -> dict[str, Scalar]:
     return assess(run, bool(parameters["loss"]), FAULTS[str(parameters["fault"])].most) | _decoded(run, key, draw)
 
 
-def line_of(cell: Cell, result: Values) -> Line:
+def row_of(cell: Cell, result: Values) -> Row:
     """The row of a finished cell."""
     wire, fault, loss = (str(cell.parameters[name]) for name in ("wire", "fault", "loss"))
     late_s = LATE_S if FAULTS[fault].wire != WireFaults() else 0.0
     deadman_s = DEADMEN_S[wire]
     outcome = Outcome(**result)  # type: ignore[arg-type]
-    return Line(
+    return Row(
         wire, fault, loss, cell.seed, outcome, STALE_S + GRACE_S + late_s,
         None if deadman_s is None else deadman_s + GRACE_S + late_s,
     )  # fmt: skip
 
 
 def assess(run: FaultRun, is_lost: bool, most: float = np.inf) -> dict[str, Scalar]:
-    """What the robot did, beside what the journal says it was told; it cannot do more than `most` on any axis."""
+    """The fields of an `Outcome` that compare the robot's motion with the journal; `most` limits the robot's axes."""
     altered, arrived_s, held_s = 0, 0.0, 0.0
     ends_s = [when_s for when_s, _ in run.in_force[1:]] + [END_S]
     for (when_s, velocity), end_s in zip(run.in_force, ends_s, strict=True):
@@ -180,14 +180,14 @@ def assess(run: FaultRun, is_lost: bool, most: float = np.inf) -> dict[str, Scal
 
 
 def _sent_s(journal: JournalRecord, velocity: np.ndarray, by_s: float) -> float | None:
-    """When that command was last sent, by then; None when it never was."""
+    """When that command was last sent before `by_s`; None when it never was."""
     times_s = START_S + journal.ticks / journal.header.rate_hz
     same = np.all(np.abs(journal.sent - velocity) < _SAME, axis=1) & (times_s <= by_s + 1e-9)
     return float(times_s[same][-1]) if np.any(same) else None
 
 
 def _windows_sent(journal: JournalRecord, most: float) -> list[bool]:
-    """For each window of the message until the controller fell silent, whether most of it has left and can be done."""
+    """For each window until the base commands end, whether most of it was sent and is within the robot's limits."""
     count = int((SILENT_S - START_S) * journal.header.rate_hz) // _WINDOW_TICKS
     left = np.zeros(count * _WINDOW_TICKS, dtype=np.bool_)
     with_noise = ((journal.flags & (NOISE | UNSENT)) == NOISE) & np.all(np.abs(journal.sent) <= most, axis=1)

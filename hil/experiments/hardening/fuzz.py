@@ -1,14 +1,14 @@
-"""Fuzzing: damaged traffic into both ends of every wire, and what they make of it.
+"""Fuzzing: damaged traffic into both ends of every wire, and which messages they accept.
 
-An input is one to three valid messages with up to three kinds of damage. Nothing may crash or hang; after any of it a
-sound message must be understood. What an end has understood is compared with what was fed to it:
+An input is one to three valid messages with up to three kinds of damage. Nothing may crash or hang, and after any input
+a valid message must be accepted. The messages that an end accepts are compared with what was fed to it:
 
-- whole: a message that was made by a sender, at most as often as its bytes came.
-- altered: bytes that came like that and passed every check, but that no sender made. A checksum of 16 bits lets one
-  in 65,536 pass of those whose damage is arbitrary, and none whose damage is one bit or one burst of up to 16, so the
-  expected number is at most the failed checks over 65,535. Text has no checksum at all: every whole text which reads
-  as a command is one.
-- unsent: a message that was understood more often than its bytes came. There must be none.
+- whole: a message that a sender made, counted at most as often as its bytes arrived.
+- altered: bytes that arrived and passed every check, but that no sender made. A checksum of 16 bits passes one in
+  65,536 of arbitrarily damaged messages, and none whose damage is one bit or one burst of up to 16 bits, so the
+  expected number is at most the failed checks over 65,535. Text has no checksum: any text that parses as a command
+  is one.
+- unsent: a message that was accepted more often than its bytes arrived. There must be none.
 """
 
 import random
@@ -27,7 +27,7 @@ _PER_SESSION = 250
 
 
 def fuzz_cells(inputs: int, first_seed: int) -> list[Cell]:
-    """As many cells for each target as give at least `inputs` altogether."""
+    """Equally many cells of each target, with at least `inputs` inputs in total."""
     each = -(-inputs // (len(TARGETS) * PER_CELL))
     return [
         Cell("fuzz", {"target": name, "inputs": PER_CELL}, first_seed + number)
@@ -37,7 +37,7 @@ def fuzz_cells(inputs: int, first_seed: int) -> list[Cell]:
 
 
 def fuzz_cell(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """Counts of one cell; `failure` is the first traceback, empty when there was none."""
+    """The counts of one cell by name, and `failure`, the first traceback or an empty text."""
     draw = random.Random(f"{parameters['target']} {seed}")
     total: Counter[str] = Counter()
     longest_s, failure = 0.0, ""
@@ -53,12 +53,12 @@ def fuzz_cell(parameters: Values, seed: int) -> dict[str, Scalar]:
     return {**{name: total[name] for name in COUNTS}, "longest_ms": round(1e3 * longest_s, 3), "failure": failure}
 
 
-COUNTS = ("inputs", "bytes", "whole", "altered", "unsent", "failed_checks", "crashes", "deaf")
+COUNTS = ("inputs", "bytes", "whole", "altered", "unsent", "failed_checks", "crashes", "unresponsive")
 
 
 @dataclass(frozen=True)
 class Summary:
-    """One target: its counts, and the most altered messages to expect, None for text.
+    """One target: its counts, and the expected number of altered messages at most, None for text.
 
     `longest_ms` is the processor time of the slowest input.
     """
@@ -71,7 +71,7 @@ class Summary:
 
 
 def summarise(target: str, results: Sequence[Values]) -> Summary:
-    """Add up a target's cells."""
+    """The sum of a target's cells."""
     counts = {name: sum(int(result[name]) for result in results) for name in COUNTS}
     chance = None if target.startswith("plaintext") else 2.0**-48 if target.endswith("signed") else 1.0 / 65_535
     return Summary(
@@ -84,7 +84,7 @@ def summarise(target: str, results: Sequence[Values]) -> Summary:
 
 
 class _Session:
-    """One target and what it is fed; a crash ends it."""
+    """One target and the inputs it is fed; a crash ends it."""
 
     def __init__(self, target: Target, draw: random.Random) -> None:
         self.counts: Counter[str] = Counter()
@@ -94,7 +94,7 @@ class _Session:
         self._draw = draw
 
     def run(self, inputs: int) -> None:
-        """Feed so many inputs, and see whether a sound message is understood afterwards."""
+        """Feed so many inputs, then check that a valid message is accepted."""
         target = self._target
         try:
             for _ in range(inputs):
@@ -102,17 +102,17 @@ class _Session:
                 target.made.update(sealed)
                 self._feed(data)
             self._feed(target.filler)
-            before = len(target.heard)
-            sound = target.last_word()
-            target.made.add(sound)
-            self._feed(sound)
-            self.counts["deaf"] += sound not in target.heard[before:]
+            before = len(target.accepted)
+            probe = target.probe_message()
+            target.made.add(probe)
+            self._feed(probe)
+            self.counts["unresponsive"] += probe not in target.accepted[before:]
         except Exception:
             self.counts["crashes"] += 1
             self.failure = traceback.format_exc()
         finally:
             target.shutdown()
-        self._weigh()
+        self._count_accepted()
 
     def _feed(self, data: bytes) -> None:
         began_s = time.thread_time()
@@ -121,10 +121,10 @@ class _Session:
         self.counts["inputs"] += 1
         self.counts["bytes"] += len(data)
 
-    def _weigh(self) -> None:
+    def _count_accepted(self) -> None:
         stream = bytes(self._target.stream)
         self.counts["failed_checks"] += self._target.failed_checks
-        for message, times in Counter(self._target.heard).items():
+        for message, times in Counter(self._target.accepted).items():
             came = stream.count(message)
             self.counts["whole" if message in self._target.made else "altered"] += min(times, came)
             self.counts["unsent"] += max(0, times - came)

@@ -1,4 +1,4 @@
-"""Both ends of every wire, telling of each message that passed whatever check its format has."""
+"""Both ends of every wire, which report each message that passed the checks of its format."""
 
 from collections.abc import Callable
 from typing import Any
@@ -23,24 +23,24 @@ from mtm_onboard.links.mavlink_profiles import PROFILES, Profile
 from mtm_onboard.links.mavlink_state import VehicleState
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 
-# Takes a message as the bytes that it came in.
-Hears = Callable[[bytes], None]
+# Called with the bytes of an accepted message.
+OnMessage = Callable[[bytes], None]
 
 
 class FedPort(Port):
-    """A line on which `waiting` arrives; nobody listens at its other end."""
+    """A line on which `waiting` arrives and whose other end discards everything."""
 
     def __init__(self) -> None:
         self.waiting = bytearray()
 
     def receive(self) -> bytes | None:
-        """What waits."""
+        """The bytes that wait."""
         data = bytes(self.waiting)
         self.waiting.clear()
         return data
 
     def answer(self, text: bytes) -> None:
-        """Nobody listens."""
+        """Discard it."""
 
     push = answer
 
@@ -48,12 +48,12 @@ class FedPort(Port):
         """There is nothing to release."""
 
 
-class HearingNode(CanMotionController):
+class CanNodeListener(CanMotionController):
     """The robot on the CAN bus; `stream` is its end of it."""
 
-    def __init__(self, controller: MotionController, bus: LineEnd, hears: Hears) -> None:
+    def __init__(self, controller: MotionController, bus: LineEnd, on_message: OnMessage) -> None:
         super().__init__(controller, bus)
-        self._hears = hears
+        self._on_message = on_message
 
     @property
     def stream(self) -> CanStream:
@@ -61,16 +61,16 @@ class HearingNode(CanMotionController):
         return self._wire
 
     def _obey(self, message: Message, now_s: float) -> None:
-        self._hears(encode(message))
+        self._on_message(encode(message))
         super()._obey(message, now_s)
 
 
-class HearingCan(RoboMasterCan):
+class CanLinkListener(RoboMasterCan):
     """The transport on the CAN bus."""
 
-    def __init__(self, bus: LineEnd, hears: Hears) -> None:
+    def __init__(self, bus: LineEnd, on_message: OnMessage) -> None:
         super().__init__(bus)
-        self._hears = hears
+        self._on_message = on_message
 
     @property
     def failed_checks(self) -> int:
@@ -78,72 +78,72 @@ class HearingCan(RoboMasterCan):
         return 0 if self._stream is None else self._stream.parser.checksum_failures
 
     def _take(self, message: Message, now_s: float) -> None:
-        self._hears(encode(message))
+        self._on_message(encode(message))
         super()._take(message, now_s)
 
 
-class HearingServer(PlaintextMotionController):
-    """The plaintext robot, which tells of what it obeys."""
+class PlaintextNodeListener(PlaintextMotionController):
+    """The robot on the plaintext line; reports the commands that it obeys."""
 
-    def __init__(self, controller: MotionController, port: Port, hears: Hears) -> None:
+    def __init__(self, controller: MotionController, port: Port, on_message: OnMessage) -> None:
         super().__init__(controller, [port])
-        self._hears = hears
+        self._on_message = on_message
 
     def _obey(self, port: Port, text: str, now_s: float) -> None:
         before = self.obeyed
         super()._obey(port, text, now_s)
         if self.obeyed > before:
-            self._hears(as_text(text) + b";")
+            self._on_message(as_text(text) + b";")
 
 
-class HearingPlaintext(LineTransport):
-    """The plaintext transport, which tells of what it does not call malformed."""
+class PlaintextLinkListener(LineTransport):
+    """Our end of the plaintext line; reports the texts that are not malformed."""
 
-    def __init__(self, link: ByteLink, hears: Hears) -> None:
+    def __init__(self, link: ByteLink, on_message: OnMessage) -> None:
         super().__init__(link)
-        self._hears = hears
+        self._on_message = on_message
 
     def _take(self, text: str, now_s: float) -> None:
         before = self.malformed
         super()._take(text, now_s)
         if self.malformed == before and text.strip(" "):
-            self._hears(as_text(text) + b";")
+            self._on_message(as_text(text) + b";")
 
 
-class HearingVehicle(MavlinkVehicle):
+class VehicleListener(MavlinkVehicle):
     """The autopilot."""
 
-    def __init__(self, port: PipeEnd, key: bytes | None, hears: Hears) -> None:
+    def __init__(self, port: PipeEnd, key: bytes | None, on_message: OnMessage) -> None:
         plant = MecanumPlant(calibrated_parameters(), 0)
         super().__init__(COPTER, plant, port, is_guided=True, is_armed=True, signing_key=key, timestamp=signing_time)
-        self._hears = hears
+        self._on_message = on_message
 
     def _take(self, message: Any, now_s: float) -> None:
-        self._hears(bytes(message.get_msgbuf()))
+        self._on_message(bytes(message.get_msgbuf()))
         super()._take(message, now_s)
 
 
-class HearingMavlink(MavlinkTransport):
+class MavlinkLinkListener(MavlinkTransport):
     """The MAVLink transport."""
 
-    def __init__(self, port: PipeEnd, clock: SimulatedClock, hears: Hears) -> None:
+    def __init__(self, port: PipeEnd, clock: SimulatedClock, on_message: OnMessage) -> None:
         super().__init__(profile="copter", clock=clock, open_port=lambda: port)
-        self._vehicle = _HearingState(PROFILES["copter"], hears)
+        self._vehicle = _VehicleStateListener(PROFILES["copter"], on_message)
 
 
-class _HearingState(VehicleState):
-    def __init__(self, profile: Profile, hears: Hears) -> None:
+class _VehicleStateListener(VehicleState):
+    def __init__(self, profile: Profile, on_message: OnMessage) -> None:
         super().__init__(profile, 1)
-        self._hears = hears
+        self._on_message = on_message
 
     def take(self, message: Any, now_s: float) -> bool:
-        """Tell of it, then read it."""
-        self._hears(bytes(message.get_msgbuf()))
+        """Report the message, then take it."""
+        self._on_message(bytes(message.get_msgbuf()))
         return super().take(message, now_s)
 
 
 def as_text(text: str) -> bytes:
-    """What was read as text, with a question mark for each byte that is none."""
+    """The text as ASCII, with a question mark for every other character."""
     return text.encode("ascii", "replace")
 
 

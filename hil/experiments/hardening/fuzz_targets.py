@@ -1,4 +1,4 @@
-"""What is fuzzed: each end of each wire, fed with bytes as they come from the other end; nothing else is simulated."""
+"""What is fuzzed: each end of each wire, fed with bytes as they come from its other end."""
 
 import random
 import socket
@@ -8,13 +8,13 @@ from collections.abc import Callable
 import can
 
 from hil.experiments.hardening.fuzz_listeners import (
+    CanLinkListener,
+    CanNodeListener,
     FedPort,
-    HearingCan,
-    HearingMavlink,
-    HearingNode,
-    HearingPlaintext,
-    HearingServer,
-    HearingVehicle,
+    MavlinkLinkListener,
+    PlaintextLinkListener,
+    PlaintextNodeListener,
+    VehicleListener,
     as_text,
     idle_controller,
 )
@@ -50,8 +50,8 @@ _LATER = 100_000  # a second, in the signature's unit
 class Target(ABC):
     """One end of a wire.
 
-    `stream` is all that came, `heard` what was understood of it, `made` what senders have made, and `filler` ends
-    whatever has begun to arrive.
+    `stream` is all bytes that arrived, `accepted` the messages accepted from them, `made` the messages that senders
+    made, and `filler` the bytes that complete whatever message has begun.
     """
 
     filler: bytes
@@ -60,11 +60,11 @@ class Target(ABC):
         self.traffic = traffic
         self.made = {piece for message in traffic.messages for piece in self._pieces(message)}
         self.stream = bytearray()
-        self.heard: list[bytes] = []
+        self.accepted: list[bytes] = []
         self._now_s = 0.0
 
     def feed(self, draw: random.Random, data: bytes) -> None:
-        """Have `data` arrive and do what is due."""
+        """Let `data` arrive, then run one period."""
         self._now_s += STEP_S
         self.stream += self._as_read(data)
         self._arrive(draw, data)
@@ -75,15 +75,15 @@ class Target(ABC):
         """Checksums that were found wrong; 0 for a format without."""
         return 0
 
-    def last_word(self) -> bytes:
-        """A sound message that this end has to understand whatever came before it."""
+    def probe_message(self) -> bytes:
+        """A valid message that this end must accept whatever came before it."""
         return self.traffic.messages[0]
 
     def _as_read(self, data: bytes) -> bytes:
         return data
 
     def _pieces(self, message: bytes) -> list[bytes]:
-        """What this end understands one by one."""
+        """The messages that this end accepts separately."""
         return [message]
 
     @abstractmethod
@@ -92,7 +92,7 @@ class Target(ABC):
 
     @abstractmethod
     def _serve(self, now_s: float) -> None:
-        """Have this end read it, and take away what it says."""
+        """Let this end read it, and discard what it answers."""
 
     def shutdown(self) -> None:  # noqa: B027 - most hold nothing
         """Release what the target holds."""
@@ -112,7 +112,7 @@ class _Can(Target):
             self._put(self._send_id, data[:length], extended=False)
             data = data[length:]
             if draw.random() < 0.02:
-                # Neither another id nor an extended one of the same number is the robot's.
+                # Frames of another id, or of an extended id with the same number, must be ignored.
                 self._put(draw.choice((0, 0x203, 0x7FF)), draw.randbytes(8), extended=False)
                 self._put(self._send_id, draw.randbytes(8), extended=True)
 
@@ -132,7 +132,7 @@ class CanRobot(_Can):
     def __init__(self) -> None:
         feeder, end = can_line()
         super().__init__(can_to_robot(), feeder)
-        self._node = HearingNode(idle_controller(), end, self.heard.append)
+        self._node = CanNodeListener(idle_controller(), end, self.accepted.append)
 
     @property
     def failed_checks(self) -> int:
@@ -152,7 +152,7 @@ class CanLink(_Can):
     def __init__(self) -> None:
         feeder, end = can_line()
         super().__init__(can_from_robot(), feeder)
-        self._link = HearingCan(end, self.heard.append)
+        self._link = CanLinkListener(end, self.accepted.append)
         self._link.open()
 
     @property
@@ -181,7 +181,7 @@ class PlaintextRobot(_Plaintext):
     def __init__(self) -> None:
         super().__init__(plaintext_to_robot())
         self._port = FedPort()
-        self._node = HearingServer(idle_controller(), self._port, self.heard.append)
+        self._node = PlaintextNodeListener(idle_controller(), self._port, self.accepted.append)
 
     def _arrive(self, draw: random.Random, data: bytes) -> None:
         self._port.waiting += data
@@ -191,7 +191,7 @@ class PlaintextRobot(_Plaintext):
 
 
 class PlaintextLink(_Plaintext):
-    """The plaintext transport; when it calls its link lost, another one takes its place on a line of its own."""
+    """The plaintext transport; when it reports a lost link, a new one on a new line replaces it."""
 
     def __init__(self) -> None:
         super().__init__(plaintext_from_robot())
@@ -200,7 +200,7 @@ class PlaintextLink(_Plaintext):
     def _connect(self) -> None:
         ours, theirs = socket.socketpair()
         self._port = LinePort(theirs.detach())
-        self._link = HearingPlaintext(ByteLink(ours.detach()), self.heard.append)
+        self._link = PlaintextLinkListener(ByteLink(ours.detach()), self.accepted.append)
         self._link.open()
 
     def _arrive(self, draw: random.Random, data: bytes) -> None:
@@ -240,15 +240,15 @@ class Vehicle(_Mavlink):
         feeder, end = byte_pipe()
         super().__init__(mavlink_to_vehicle(key), feeder)
         self._key = key
-        self._vehicle = HearingVehicle(end, key, self.heard.append)
+        self._vehicle = VehicleListener(end, key, self.accepted.append)
 
     @property
     def failed_checks(self) -> int:
-        """Frames that were damaged in whatever way, of which most had a wrong checksum."""
+        """Damaged frames of any kind, most of which have a wrong checksum."""
         return self._vehicle.refused_frames
 
-    def last_word(self) -> bytes:
-        """Signed later than all the others, or it would count as a replay."""
+    def probe_message(self) -> bytes:
+        """Signed with a later time than all others, so that it is no replay."""
         codec = MavlinkCodec(1, COMPANION_COMPONENT, self._key, lambda: signing_time() + _LATER)
         return codec.encode(companion_heartbeat(codec.messages))
 
@@ -264,7 +264,7 @@ class VehicleLink(_Mavlink):
         feeder, end = byte_pipe()
         super().__init__(mavlink_from_vehicle(), feeder)
         self._clock = SimulatedClock()
-        self._link = HearingMavlink(end, self._clock, self.heard.append)
+        self._link = MavlinkLinkListener(end, self._clock, self.accepted.append)
         # The first message is the heartbeat of a vehicle that is ready.
         self.stream += self.traffic.messages[0]
         feeder.write(self.traffic.messages[0])
@@ -272,7 +272,7 @@ class VehicleLink(_Mavlink):
 
     @property
     def failed_checks(self) -> int:
-        """Frames that were damaged in whatever way, of which most had a wrong checksum."""
+        """Damaged frames of any kind, most of which have a wrong checksum."""
         return int(self._link.health()["bad_frames"])
 
     def _serve(self, now_s: float) -> None:

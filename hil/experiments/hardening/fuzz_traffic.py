@@ -1,4 +1,4 @@
-"""Valid traffic of every wire, in both directions; each speed command and each push has values of its own."""
+"""Valid traffic of every wire in both directions; every speed command and every push has different values."""
 
 import random
 import struct
@@ -50,7 +50,7 @@ _SIGNATURE_BYTES, _SIGNED = 13, 1
 
 
 def signing_time() -> int:
-    """A signature's time, the same for everybody."""
+    """The time of every signature."""
     return 10**12
 
 
@@ -84,7 +84,7 @@ def can_from_robot() -> Traffic:
 
 
 def plaintext_to_robot() -> Traffic:
-    """What a client of the SDK writes, and some of what others would."""
+    """What a client of the SDK writes, and commands of other clients."""
     plain = (
         b"command;", b"quit;", numbered(FREE_MODE, 1), numbered(SUBSCRIBE, 2), b"version;", b"robot battery ?;",
         b"robot mode ?;", b"robot mode gimbal_lead;", b"chassis push freq 10;", b"chassis position ?;",
@@ -161,7 +161,7 @@ def _mavlink_seal() -> Callable[[random.Random, bytes], bytes]:
     messages = dialect()
 
     def seal(draw: random.Random, frame: bytes) -> bytes:
-        """With another content and a right checksum; a signature stays as it is, and is then wrong."""
+        """Other content with a correct checksum; a signature is kept, and is then wrong."""
         end = _PAYLOAD_AT + frame[1]
         signature = frame[-_SIGNATURE_BYTES:] if frame[2] & _SIGNED else b""
         payload = _another(draw, frame[_PAYLOAD_AT:end])[:255]
@@ -174,7 +174,7 @@ def _mavlink_seal() -> Callable[[random.Random, bytes], bytes]:
 
 
 def _another(draw: random.Random, payload: bytes) -> bytes:
-    """A payload of about that length, with some or all of its bytes changed."""
+    """A payload of about the same length with some or all bytes changed."""
     changed = bytearray(draw.randbytes(len(payload)) if draw.random() < 0.3 else payload)
     for _ in range(draw.randint(0, 4)):
         if changed:

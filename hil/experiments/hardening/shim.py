@@ -1,6 +1,5 @@
-"""The paper's job with the noise played by the microcontroller's C code, beside the same rollouts from Python."""
+"""The paper's RoboMaster message played by the microcontroller's C code, beside the same rollouts played by Python."""
 
-import csv
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,12 +10,12 @@ from rich.console import Console
 from hil.experiments.detectors.bench import FIRST_SEED, PAPER_SIGMA
 from hil.experiments.detectors.bench_recording import Job, record
 from hil.experiments.detectors.bench_rollout import job_of, plant_of, read_matched
-from hil.experiments.detectors.paper_robomaster import Proportion
 from hil.experiments.runs.cells import Cell, CellStore, Scalar, Values
+from hil.experiments.runs.proportion import Proportion
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 from hil.plants.mecanum import MecanumParameters
 from hil.vehicles.shim_modulator import ShimModulator
-from mtm_onboard.protocol.atomicfile import replacing
 
 PYTHON, SHIM = "python", "shim"
 JOB = Job(4, 150, 1, PAPER_SIGMA)
@@ -24,10 +23,10 @@ JOB = Job(4, 150, 1, PAPER_SIGMA)
 
 @dataclass(frozen=True)
 class Comparison:
-    """Whole messages that came through from each; `same`: rollouts decoded to the same four symbols either way.
+    """Share of messages decoded from each; `same`: rollouts decoded to the same four symbols from both.
 
-    `apart_m` is the farthest that a robot was from where it was in the other run, in half of the rollouts and in all;
-    rounding alone moves it little, but now and then a robot reaches a waypoint a tick earlier.
+    `apart_m`: greatest distance (median over rollouts, and maximum) between a robot's positions in the two runs.
+    Rounding alone moves it little, but sometimes a robot reaches a waypoint one tick earlier.
     """
 
     python: Proportion
@@ -39,14 +38,14 @@ class Comparison:
 def compare(
     rollouts: int, plant: MecanumParameters, store: CellStore, console: Console, workers: int | None = None
 ) -> Comparison:
-    """Run every rollout twice. Raises MtmError without a C compiler or cffi."""
+    """The comparison over rollouts that are each run twice. Raises MtmError without a C compiler or cffi."""
     parameters = {**asdict(JOB), **asdict(plant)}
     cells = [Cell("shim", parameters, FIRST_SEED + number) for number in range(rollouts)]
     return _comparison(run_sweep(read_both, cells, store, console, workers))
 
 
 def read_both(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """One rollout with either modulator, decoded by the matched detector."""
+    """One rollout run with each of both modulators and decoded by the matched detector."""
     job, plant = job_of(parameters), plant_of(parameters)
     python, shim = record(job, plant, seed), record(job, plant, seed, ShimModulator)
     decided = {PYTHON: read_matched(job, python), SHIM: read_matched(job, shim)}
@@ -69,17 +68,13 @@ def _comparison(results: Sequence[Values]) -> Comparison:
     return Comparison(share(PYTHON), share(SHIM), share("same"), (float(np.median(apart_m)), max(apart_m)))
 
 
-def write_csv(path: Path, comparison: Comparison, comments: Sequence[str]) -> None:
-    """Write the three shares after the comments, of which the first is the command line."""
+def write_csv(path: Path, comparison: Comparison, command: str, notes: Sequence[str]) -> None:
+    """Write the three shares under the command line and the notes."""
     shares = {PYTHON: comparison.python, SHIM: comparison.shim, "same symbols from both": comparison.same}
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(f"# {comment}\n" for comment in comments)
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(
-            ("played_by", "message_ticks", "rollouts", "messages", "percent", "percent_low", "percent_high")
-        )
-        for name, share in shares.items():
-            percents = (share.percent, *share.interval_percent)
-            writer.writerow(
-                (name, JOB.window_ticks, share.trials, share.successes, *(f"{percent:.2f}" for percent in percents))
-            )
+    columns = ("played_by", "message_ticks", "rollouts", "messages", "percent", "percent_low", "percent_high")
+    write_result_csv(path, command, columns, [_csv_row(name, share) for name, share in shares.items()], notes)
+
+
+def _csv_row(name: str, share: Proportion) -> tuple[object, ...]:
+    percents = (f"{percent:.2f}" for percent in (share.percent, *share.interval_percent))
+    return name, JOB.window_ticks, share.trials, share.successes, *percents

@@ -44,8 +44,8 @@ _CLEAN_NATS = 20.0
 
 
 @dataclass(frozen=True)
-class Line:
-    """One line of the table: what was done to frames of this kind, and how often which payload was read.
+class Row:
+    """One row of the table: what was done to frames of this kind, and how often which payload was read.
 
     `right` counts payloads that were sent under this key and epoch, `wrong` others that passed the check; `tries`
     are checks made on candidates that were not sent.
@@ -68,7 +68,7 @@ class Line:
 
 
 def frame_cells(frames: int, seed: int) -> list[list[Cell]]:
-    """The cells of each line: `frames` under noise for each check, half of them with a code, and twice as many attacks.
+    """The cells of each row: `frames` under noise for each check, half of them with a code, and twice as many attacks.
 
     The decoders are compared on a tenth as many.
     """
@@ -90,20 +90,20 @@ def frame_cells(frames: int, seed: int) -> list[list[Cell]]:
     return lines
 
 
-def line_of(cells: Sequence[Cell], results: Sequence[Values]) -> Line:
-    """Add up the cells of one line."""
+def row_of(cells: Sequence[Cell], results: Sequence[Values]) -> Row:
+    """The sum of one row's cells."""
     asked = cells[0].parameters
     frames, right, wrong, tries = (
         sum(int(result[name]) for result in results) for name in ("frames", "right", "wrong", "tries")
     )
-    return Line(
+    return Row(
         str(asked["what"]), str(asked["code"]), str(asked["check"]), int(asked["check_bits"]),
         float(asked["distance"]), frames, right, wrong, tries,
     )  # fmt: skip
 
 
 def read_frames(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """Compute one cell: a hundred frames, and what was read of them."""
+    """The counts of one cell: what was read of a hundred frames."""
     what = str(parameters["what"])
     draw = np.random.default_rng([_STREAM, seed])
     scheme = _scheme(str(parameters["code"]), str(parameters["check"]), int(parameters["check_bits"]))
@@ -132,7 +132,7 @@ def read_frames(parameters: Values, seed: int) -> dict[str, Scalar]:
 
 
 def noisy_ratios(symbols: NDArray[np.int64], distance: float, draw: np.random.Generator) -> Floats:
-    """Log-likelihood ratios (L, M) in nats of symbols sent at that distance."""
+    """(L, M): log-likelihood ratios, nats, of `symbols` (L,) at that distance, some of them missing (zeros)."""
     means = np.full((len(symbols), _ALPHABET), -(distance**2) / 2.0)
     means[np.arange(len(symbols)), symbols] *= -1.0
     ratios = means + distance * draw.normal(size=means.shape)

@@ -1,4 +1,4 @@
-"""Whole messages received: a framed payload from one robot, by its clock, through occlusions and repeats.
+"""Whole messages received: a framed payload from one robot, with its clock, occlusions and repetitions.
 
 One cell is one rollout of four robots, each with a key and a payload of its own under a rolling schedule, of which one
 is read by itself. The recording covers a given number of repetitions and little more, and the auditor knows its time
@@ -41,7 +41,7 @@ _TEXT_CHARACTERS = "abcdefghijklmnopqrstuvwxyz 0123456789"
 
 @dataclass(frozen=True)
 class Job:
-    """What each robot says, and how much of it is recorded: `windows` symbols of an alphabet of 256, `ticks` each.
+    """What each robot sends, and how much of it is recorded: `windows` symbols of an alphabet of 256, `ticks` each.
 
     `hidden` is which half of every repetition is occluded.
     """
@@ -74,7 +74,7 @@ JOBS: dict[str, Job] = {
 
 
 def receive(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """Run one rollout and read one of its robots: whether its message was received, and whether a wrong one was."""
+    """Whether one robot's message was `received` in one rollout, and whether a `wrong` one passed the check."""
     job = JOBS[str(parameters["job"])]
     draw = np.random.default_rng([_STREAM, seed])
     fleet = _fleet_scheme(job)
@@ -93,7 +93,7 @@ def receive(parameters: Values, seed: int) -> dict[str, Scalar]:
     tracks = motion_capture_tracks(run_lockstep(settings), seed, MotionCapture())
     robot = seed % ROBOTS
     name = fleet.channels[robot].name
-    seen = _seen(tracks[robot], onset_s, end_s, job, draw)
+    seen = _observed_track(tracks[robot], onset_s, end_s, job, draw)
     error_s = float(draw.uniform(-_CLOCK_ERROR_S, _CLOCK_ERROR_S))
     found = _read(seen, keys[name], RecordedAt(unix_s + error_s, _CLOCK_ERROR_S))
     return {"received": payloads[name] in found, "wrong": any(payload != payloads[name] for payload in found)}
@@ -110,7 +110,7 @@ def _own_scheme(fleet: Scheme, channel: Channel, job: Job) -> Scheme:
 
 
 def _silence(fleet: Scheme) -> tuple[int, ...]:
-    """What the rig is told the fleet sends; each robot's own modulator sends something else."""
+    """Symbols for the rig's settings; each robot's own modulator sends its own message instead."""
     return (0,) * fleet.message_symbols
 
 
@@ -121,7 +121,7 @@ def _payload(framing: Framing, draw: np.random.Generator) -> Payload:
     return "".join(letters.tolist())
 
 
-def _seen(track: Track, onset_s: float, end_s: float, job: Job, draw: np.random.Generator) -> Track:
+def _observed_track(track: Track, onset_s: float, end_s: float, job: Job, draw: np.random.Generator) -> Track:
     """The recording from shortly before the message, with half of each repetition occluded where the job says so."""
     rows = (track.times_s >= onset_s - _LEAD_S + 0.1) & (track.times_s <= end_s)
     times_s, positions, valid = track.times_s[rows], track.positions[rows], track.valid[rows].copy()
@@ -139,7 +139,7 @@ def _seen(track: Track, onset_s: float, end_s: float, job: Job, draw: np.random.
 
 
 def _read(track: Track, key: Key, at: RecordedAt) -> list[Payload]:
-    """Payloads whose tag verifies."""
+    """The payloads whose tag verifies."""
     start = start_of(key.scheme, [track], None, at)
     (channel,) = key.scheme.channels
     observations = [Observation(channel, glimpse_of_track(track))]

@@ -1,1 +1,1 @@
-"""What every experiment stands on: cells that are kept, sweeps over them, intervals and result files."""
+"""What all experiments share: cells and their store, sweeps over cells, intervals and result files."""

@@ -1,26 +1,26 @@
-"""Cells of a sweep, and the file that keeps what they gave."""
+"""Cells, the units of work of every experiment, and the file that keeps their results.
 
-import hashlib
+In `hil` the word cell has this meaning only.
+"""
+
 import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from hil.experiments.runs.fingerprint import code_fingerprint
 from mtm_onboard.protocol import MtmError
 
 Scalar = str | int | float | bool
 Values = Mapping[str, Scalar]
 
-_PACKAGES = ("mtm_onboard", "mtm_audit", "hil")
-
 
 @dataclass(frozen=True)
 class Cell:
-    """One piece of work: its result is a function of these three and of the code."""
+    """One unit of work: its result is a function of these three and of the code."""
 
     experiment: str
     parameters: Values
@@ -28,19 +28,8 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """The same text for the same cell, whatever the order of its parameters."""
+        """A text that is the same for equal cells, whatever the order of their parameters."""
         return json.dumps([self.experiment, self.parameters, self.seed], sort_keys=True)
-
-
-@cache
-def code_fingerprint() -> str:
-    """Sixteen hexadecimal digits that differ when any Python file of the project does."""
-    root = Path(__file__).parents[3]
-    digest = hashlib.sha256()
-    for package in _PACKAGES:
-        for path in sorted((root / package).rglob("*.py")):
-            digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()[:16]
 
 
 class CellStore:
@@ -74,7 +63,7 @@ class CellStore:
         return self._finished.get(cell.name)
 
     def add(self, cell: Cell, result: Values) -> None:
-        """Keep a result for good."""
+        """Store a result and flush it to the disk."""
         entry = {"code": self._code, "cell": cell.name, "result": dict(result)}
         self._file.write(json.dumps(entry).encode() + b"\n")
         os.fsync(self._file.fileno())

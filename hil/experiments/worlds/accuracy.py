@@ -8,7 +8,7 @@ import numpy as np
 from hil.experiments.detectors.accuracy_rollout import DETECTORS, right_symbols
 from hil.experiments.runs.cells import Scalar, Values
 from hil.experiments.worlds.reading import read_windows
-from hil.experiments.worlds.rollout import watch
+from hil.experiments.worlds.rollout import film_and_track
 from hil.worlds.noise import keyed_noise
 from hil.worlds.registry import make_world
 from hil.worlds.schemes import SIGNALS, split_scheme
@@ -45,7 +45,8 @@ def read_world(parameters: Values, seed: int) -> dict[str, Scalar]:
 
     Gives what `accuracy_rollout.right_symbols` does.
     """
-    # Windows of equal length are equally well read whichever waveforms they have, and fixed ones are known by place.
+    # The waveforms make no difference to the accuracy, and under a fixed schedule they do not depend on the time of
+    # day.
     scheme = replace(scheme_from_table(tomllib.loads(str(parameters["scheme"]))["scheme"]), schedule="fixed")
     world = make_world(str(parameters["simulator"]))
     codebook = Codebook(np.random.default_rng([_KEYS_STREAM, seed]).bytes(32), scheme)
@@ -56,13 +57,13 @@ def read_world(parameters: Values, seed: int) -> dict[str, Scalar]:
     noise = np.zeros((len(goals) * ticks, len(world.axes)))
     noise[: scheme.message_ticks] = keyed_noise(codebook, [symbols], world.axes)
     (rollout,) = world.run(goals[None], noise.reshape(1, len(goals), ticks, -1), [seed])
-    seen = watch(world, rollout, scheme)
+    seen = film_and_track(world, rollout, scheme)
     scores = read_windows(codebook, seen, 1, str(parameters["detector"]))
     return right_symbols(scheme, scores, channel_symbols(symbols, scheme))
 
 
 def _goals(world: World, seed: int) -> Integers:
-    """All goals in a row, or one where each goal would be a film of its own."""
+    """All goals in a row, or one goal in the world that films each goal separately."""
     if world.name == "lunar-lander":
         return np.array([seed % world.choices])
     return np.random.default_rng([_SYMBOLS_STREAM, seed, 1]).integers(world.choices, size=world.goals)

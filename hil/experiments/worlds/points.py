@@ -1,4 +1,8 @@
-"""The points of the design space that the paper measured in its simulated worlds, and those asked beyond them."""
+"""The points of the paper's design space (Section "Design Space") that are measured in the simulated worlds.
+
+What the paper reports for them is in paper_worlds.csv, from its appendices' tables tab:discovery-single-x to
+tab:football-indep.
+"""
 
 import csv
 from collections.abc import Mapping
@@ -71,8 +75,8 @@ def point_of(parameters: Values) -> Point:
 
 
 @dataclass(frozen=True)
-class PaperCell:
-    """What the paper reports for a point: percent of messages, its standard error (NaN where not given), margin."""
+class PaperEntry:
+    """A table entry of the paper: percent of messages right, its standard error (NaN where not given), margin."""
 
     point: Point
     percent: float
@@ -81,19 +85,19 @@ class PaperCell:
 
 
 @cache
-def paper_cells(world: str) -> tuple[PaperCell, ...]:
-    """All cells of the world's tables, in the paper's order."""
+def paper_entries(world: str) -> tuple[PaperEntry, ...]:
+    """All entries of the world's tables, in the paper's order."""
     with _PAPER_CSV.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    return tuple(_paper_cell(row) for row in rows if row["world"] == world)
+    return tuple(_paper_entry(row) for row in rows if row["world"] == world)
 
 
-def _paper_cell(row: Mapping[str, str]) -> PaperCell:
+def _paper_entry(row: Mapping[str, str]) -> PaperEntry:
     point = Point(
         row["world"], row["arrangement"], int(row["alphabet_size"]), int(row["message_ticks"]), row["symbols"],
         int(row["goals"]), row["whole"] == "yes",
     )  # fmt: skip
-    return PaperCell(point, float(row["percent"]), float(row["error"] or "nan"), float(row["margin"] or "nan"))
+    return PaperEntry(point, float(row["percent"]), float(row["error"] or "nan"), float(row["margin"] or "nan"))
 
 
 @dataclass(frozen=True)

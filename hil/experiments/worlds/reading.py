@@ -1,7 +1,7 @@
-"""Scores of every window that a filmed rollout carries, with the paper's detector and with the matched one.
+"""Scores of every window of a filmed rollout, from the paper's detector and from the matched one.
 
-The auditor knows when each window begins; the paper's detector tries its 101 rates on each window nonetheless, and the
-matched one knows nothing of the plant.
+The start of each window is given. The paper's detector searches its 101 rates in each window all the same (appendix
+"Detection Pipeline Details"); the matched one knows nothing of the plant.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,9 +22,11 @@ COHERENCY, MATCHED = "coherency", "matched"
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What the auditor makes of one shot: when its first tick was, which of the rollout's ticks it shows, and how each
-    body moved.
+class ObservedShot:
+    """One shot as the auditor observes it.
+
+    `start_s` is the instant of its first tick, `ticks` which of the rollout's ticks it shows, `glimpses` each body's
+    motion by name.
     """
 
     start_s: float
@@ -40,21 +42,21 @@ class _Place:
     onset_s: float
 
 
-def read_windows(codebook: Codebook, seen: Sequence[Seen], messages: int, detector: str) -> list[Floats]:
-    """Scores of each channel's windows in a row: (messages * l_c, M), larger for what was likelier sent."""
+def read_windows(codebook: Codebook, seen: Sequence[ObservedShot], messages: int, detector: str) -> list[Floats]:
+    """For each channel its windows' scores in order, (messages * l_c, M), larger for a likelier symbol."""
     scheme = codebook.scheme
     places = [_places(scheme, channel, seen, messages) for channel in scheme.channels]
-    read: Callable[[Codebook, Sequence[Seen], Sequence[list[_Place]]], list[Floats]]
+    read: Callable[[Codebook, Sequence[ObservedShot], Sequence[list[_Place]]], list[Floats]]
     read = {COHERENCY: _coherency, MATCHED: _matched}[detector]
     return read(codebook, seen, places)
 
 
 def pooled_scores(scores: Sequence[Floats], detector: str) -> Floats:
-    """Of channels that carry the same: the mean of coherencies, the sum of log-likelihood ratios."""
+    """Pooled scores of channels that carry the same: the mean of coherencies, the sum of log-likelihood ratios."""
     return np.asarray(np.mean(scores, axis=0) if detector == COHERENCY else np.sum(scores, axis=0))
 
 
-def _places(scheme: Scheme, channel: Channel, seen: Sequence[Seen], messages: int) -> list[_Place]:
+def _places(scheme: Scheme, channel: Channel, seen: Sequence[ObservedShot], messages: int) -> list[_Place]:
     ticks = scheme.window_ticks(channel)
     places = []
     for first in range(0, messages * scheme.message_ticks, ticks):
@@ -63,7 +65,7 @@ def _places(scheme: Scheme, channel: Channel, seen: Sequence[Seen], messages: in
     return places
 
 
-def _coherency(codebook: Codebook, seen: Sequence[Seen], places: Sequence[list[_Place]]) -> list[Floats]:
+def _coherency(codebook: Codebook, seen: Sequence[ObservedShot], places: Sequence[list[_Place]]) -> list[Floats]:
     return [
         np.array(
             [
@@ -75,7 +77,7 @@ def _coherency(codebook: Codebook, seen: Sequence[Seen], places: Sequence[list[_
     ]  # fmt: skip
 
 
-def _matched(codebook: Codebook, seen: Sequence[Seen], places: Sequence[list[_Place]]) -> list[Floats]:
+def _matched(codebook: Codebook, seen: Sequence[ObservedShot], places: Sequence[list[_Place]]) -> list[Floats]:
     """All windows of all channels together, since they share the plant."""
     scheme = codebook.scheme
     motions: list[Motion] = []

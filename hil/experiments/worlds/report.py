@@ -7,10 +7,10 @@ from pathlib import Path
 
 from rich.table import Table
 
-from hil.experiments.detectors.paper_robomaster import Proportion
-from hil.experiments.runs.commented_csv import write_commented_csv
 from hil.experiments.runs.intervals import clopper_pearson
-from hil.experiments.worlds.points import PaperCell, headline_point
+from hil.experiments.runs.proportion import Proportion
+from hil.experiments.runs.result_file import write_result_csv
+from hil.experiments.worlds.points import PaperEntry, headline_point
 from hil.experiments.worlds.reading import COHERENCY
 from hil.experiments.worlds.rollout import NO_MESSAGE, SENT
 from hil.experiments.worlds.tables import THROUGH_A_FILE, WRONG_KEY, Row, shortest_ticks
@@ -22,7 +22,7 @@ _COLUMNS = (
     "paper_standard_error", "paper_margin", "against_the_paper",
 )  # fmt: skip
 _REMARKS = Path(__file__).with_name("remarks.toml")
-# The paper's table "Null conditions": percent of symbols right with wrong keys, and without a message.
+# The paper's table of null conditions (tab:null): percent of symbols right with wrong keys, and without a message.
 _PAPER_NULL = {
     "discovery": {WRONG_KEY: 12.10, NO_MESSAGE: 11.75},
     "lunar-lander": {WRONG_KEY: 14.70, NO_MESSAGE: 8.50},
@@ -31,12 +31,12 @@ _PAPER_NULL = {
 }
 # Arms, so that a table fits a terminal of 80 columns.
 _SHORT = {SENT: "message", WRONG_KEY: "wrong key", NO_MESSAGE: "nothing", THROUGH_A_FILE: "via file"}
-# The paper's football cells hold 64 strategies of 50 rollouts and come without an error.
+# The paper's Football entries are of 64 strategies with 50 rollouts each and come without an error.
 _FOOTBALL_TRIALS = 3200
 
 
 def against_the_paper(row: Row) -> str:
-    """`higher` or `lower` where the paper's interval and ours of the paper's detector have nothing in common."""
+    """`higher` or `lower` when our interval for the paper's detector does not overlap the paper's, else `agrees`."""
     if row.paper is None or row.goals is None or row.detector != COHERENCY:
         return ""
     low, high = row.goals.interval_percent
@@ -46,13 +46,13 @@ def against_the_paper(row: Row) -> str:
     return "lower" if high < paper_low else "agrees"
 
 
-def _paper_interval(cell: PaperCell) -> tuple[float, float]:
-    """95 % interval of a cell: of its standard error, or exact where that is missing or nothing went wrong."""
-    trials = _FOOTBALL_TRIALS if cell.point.world == "football" else 50 * cell.point.goals
-    if math.isnan(cell.error):
-        low, high = clopper_pearson(round(cell.percent / 100.0 * trials), trials)
+def _paper_interval(entry: PaperEntry) -> tuple[float, float]:
+    """95 % interval of an entry, percent: from its standard error, or exact where that is missing."""
+    trials = _FOOTBALL_TRIALS if entry.point.world == "football" else 50 * entry.point.goals
+    if math.isnan(entry.error):
+        low, high = clopper_pearson(round(entry.percent / 100.0 * trials), trials)
         return 100.0 * low, 100.0 * high
-    return cell.percent - 1.96 * cell.error, cell.percent + 1.96 * cell.error
+    return entry.percent - 1.96 * entry.error, entry.percent + 1.96 * entry.error
 
 
 def rich_table(world: str, rows: Sequence[Row]) -> Table:
@@ -84,7 +84,7 @@ def _arrow(row: Row) -> str:
 
 
 def remarks(world: str) -> list[str]:
-    """Why cells of the world differ from the paper's, a line each."""
+    """Why results of the world differ from the paper's, one line each."""
     with _REMARKS.open("rb") as file:
         found: list[str] = tomllib.load(file)[world]
     return found
@@ -101,43 +101,43 @@ def shortest_messages(rows: Sequence[Row]) -> str:
     )
 
 
-def write_null_csv(path: Path, tables: Sequence[tuple[str, Sequence[Row]]], comments: Sequence[str]) -> None:
+def write_null_csv(path: Path, tables: Sequence[tuple[str, Sequence[Row]]], command: str) -> None:
     """Write the null conditions of all worlds, with whether each interval covers chance, 1 / M."""
     columns = (
         "world", "arm", "arrangement", "alphabet_size", "message_ticks", "detector", "symbols", "symbols_correct",
         "symbol_percent", "symbol_percent_low", "symbol_percent_high", "chance_percent", "covers_chance",
         "paper_symbol_percent",
     )  # fmt: skip
-    cells = [_null_cells(world, row) for world, rows in tables for row in rows if row.goals is None]
-    write_commented_csv(path, comments, columns, cells)
+    lines = [_null_row(world, row) for world, rows in tables for row in rows if row.goals is None]
+    write_result_csv(path, command, columns, lines)
 
 
-def _null_cells(world: str, row: Row) -> tuple[object, ...]:
+def _null_row(world: str, row: Row) -> tuple[object, ...]:
     point, chance = row.point, 100.0 / row.point.alphabet_size
     low, high = row.symbols.interval_percent
     reported = _PAPER_NULL[world][row.arm] if point == headline_point(world) else ""
     return (
         world, row.arm, point.arrangement, point.alphabet_size, point.message_ticks, row.detector,
-        *_proportion(row.symbols), f"{chance:.2f}", "yes" if low <= chance <= high else "no", reported,
+        *_share_fields(row.symbols), f"{chance:.2f}", "yes" if low <= chance <= high else "no", reported,
     )  # fmt: skip
 
 
-def write_csv(path: Path, rows: Sequence[Row], comments: Sequence[str]) -> None:
-    """Write the rows after the comments, of which the first is the command line."""
-    write_commented_csv(path, comments, _COLUMNS, (_cells(row) for row in rows))
+def write_csv(path: Path, rows: Sequence[Row], command: str, notes: Sequence[str]) -> None:
+    """Write the rows under the command line and the notes."""
+    write_result_csv(path, command, _COLUMNS, (_csv_row(row) for row in rows), notes)
 
 
-def _cells(row: Row) -> tuple[object, ...]:
+def _csv_row(row: Row) -> tuple[object, ...]:
     point, paper = row.point, row.paper
     reported = ("", "", "") if paper is None else tuple(map(_or_nothing, (paper.percent, paper.error, paper.margin)))
     return (
         row.arm, point.arrangement, point.alphabet_size, point.message_ticks, point.symbols, row.detector, row.rollouts,
-        *(("",) * 5 if row.goals is None else _proportion(row.goals)), *_proportion(row.symbols),
+        *(("",) * 5 if row.goals is None else _share_fields(row.goals)), *_share_fields(row.symbols),
         "" if row.margin is None else f"{row.margin:.4f}", *reported, against_the_paper(row),
     )  # fmt: skip
 
 
-def _proportion(proportion: Proportion) -> tuple[object, ...]:
+def _share_fields(proportion: Proportion) -> tuple[object, ...]:
     low, high = proportion.interval_percent
     return (proportion.trials, proportion.successes, *(f"{value:.2f}" for value in (proportion.percent, low, high)))
 

@@ -1,4 +1,4 @@
-"""A batch of rollouts of a simulated world, sent on by the real modulator, filmed, tracked and decoded."""
+"""A batch of rollouts of a simulated world under the onboard modulator's noise, filmed, tracked and decoded."""
 
 import json
 import tempfile
@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from hil.experiments.runs.cells import Scalar, Values
-from hil.experiments.worlds.genie import GENIE, Knowledge, genie_scores, learn, lessons
+from hil.experiments.worlds.genie import GENIE, GenieModel, fit_genie, genie_scores, known_shots
 from hil.experiments.worlds.points import Point, headline_point, point_of
-from hil.experiments.worlds.reading import Seen, pooled_scores, read_windows
+from hil.experiments.worlds.reading import ObservedShot, pooled_scores, read_windows
 from hil.sensors.video import write_video
 from hil.worlds.noise import keyed_noise
 from hil.worlds.registry import make_world
@@ -31,8 +31,8 @@ MEMORY, FILE = "memory", "file"
 SOFTWARE, NATIVE = "software", "native"
 SECONDS = "seconds"
 
-# Rollouts that teach the genie; their seeds count from 0, far from any that is reported.
-_LESSONS = {"discovery": 8, "lunar-lander": 6, "reacher": 6, "football": 12}
+# Rollouts that the genie is fitted to; their seeds count from 0, far from any that is reported.
+_TRAINING_ROLLOUTS = {"discovery": 8, "lunar-lander": 6, "reacher": 6, "football": 12}
 _KEYS_STREAM, _GOALS_STREAM = 5, 6
 
 
@@ -45,16 +45,16 @@ def rollout_parameters(
     decoys: int = 0,
     parts: Sequence[str] = (),
     renderer: str = SOFTWARE,
-    frames: str = MEMORY,
+    medium: str = MEMORY,
 ) -> dict[str, Scalar]:
     """Parameters of a cell for `decode_batch`: `batch` rollouts from the cell's seed on.
 
     `parts` names the first channel when a "same" arrangement is decoded from that alone as well, `decoys` is how many
-    wrong keys try each rollout as it was recorded, and `frames` says whether they pass through a video file on the way.
+    wrong keys try each rollout, and `medium` says whether the pictures stay in memory or go through a video file.
     """
     return {
         **point.parameters(), "batch": batch, "detectors": "+".join(detectors), "arm": arm, "decoys": decoys,
-        "parts": "+".join(parts), "renderer": renderer, "frames": frames,
+        "parts": "+".join(parts), "renderer": renderer, "medium": medium,
     }  # fmt: skip
 
 
@@ -71,7 +71,7 @@ def decode_batch(parameters: Values, seed: int) -> dict[str, Scalar]:
     secrets = [[key.bytes(32) for _ in range(1 + int(parameters["decoys"]))] for key in keys]
     recorded = record(
         point, [first for first, *_ in secrets], seed, keyed=parameters["arm"] == SENT,
-        renderer=str(parameters["renderer"]), frames=str(parameters["frames"]),
+        renderer=str(parameters["renderer"]), medium=str(parameters["medium"]),
     )  # fmt: skip
     arrangements = [point.arrangement, *(part for part in str(parameters["parts"]).split("+") if part)]
     results: dict[str, list[float]] = {}
@@ -94,11 +94,11 @@ def record(
     *,
     keyed: bool = True,
     renderer: str = SOFTWARE,
-    frames: str = MEMORY,
-) -> Iterator[tuple[list[Seen], list[tuple[int, ...]]]]:
-    """Run and film one rollout for each secret, of `seed` and those after it, sending nothing unless `keyed`.
+    medium: str = MEMORY,
+) -> Iterator[tuple[list[ObservedShot], list[tuple[int, ...]]]]:
+    """Yield, for each secret, one rollout's observed shots and the symbols of each of its messages.
 
-    Yields what was seen, and each message's symbols.
+    The rollouts have `seed` and the seeds after it; without `keyed` nothing is sent.
     """
     world = make_world(point.world)
     seeds = range(seed, seed + len(secrets))
@@ -111,32 +111,34 @@ def record(
         sent = [keyed_noise(book, own, world.axes) for book, own in zip(codebooks, messages, strict=True)]
         noise = np.stack(sent).reshape(shape)
     for rollout, own in zip(world.run(goals, noise, seeds), messages, strict=True):
-        yield watch(world, rollout, point.scheme, renderer, frames), own
+        yield film_and_track(world, rollout, point.scheme, renderer, medium), own
 
 
 @cache
-def _knowledge(world: str) -> Knowledge:
-    """What the genie knows of a world, from rollouts of the headline point that nothing is measured on."""
+def _genie_model(world: str) -> GenieModel:
+    """The genie's model of a world, fitted to rollouts of the headline point on which nothing is measured."""
     point = headline_point(world)
-    secrets = [np.random.default_rng([_KEYS_STREAM, own]).bytes(32) for own in range(_LESSONS[world])]
+    secrets = [np.random.default_rng([_KEYS_STREAM, own]).bytes(32) for own in range(_TRAINING_ROLLOUTS[world])]
     examples = [
         example
         for (seen, symbols), secret in zip(record(point, secrets, 0), secrets, strict=True)
-        for channel in lessons(Codebook(secret, point.scheme), seen, symbols)
+        for channel in known_shots(Codebook(secret, point.scheme), seen, symbols)
         for example in channel
     ]
-    return learn(examples)
+    return fit_genie(examples)
 
 
-def watch(world: World, rollout: Rollout, scheme: Scheme, renderer: str = SOFTWARE, frames: str = MEMORY) -> list[Seen]:
-    """Film and track each shot of a rollout; raises MtmError when a body is not found in one."""
+def film_and_track(
+    world: World, rollout: Rollout, scheme: Scheme, renderer: str = SOFTWARE, medium: str = MEMORY
+) -> list[ObservedShot]:
+    """What is observed of each shot, filmed and tracked; raises MtmError when a body is not found in one."""
     seen = []
     for shot in rollout.shots:
         pictures = world.native_pictures(shot) if renderer == NATIVE else world.pictures(shot)
-        tracks = world.tracker().track(pictures if frames == MEMORY else _through_a_file(pictures, shot, world.rate_hz))
+        tracks = world.tracker().track(pictures if medium == MEMORY else _through_a_file(pictures, shot, world.rate_hz))
         glimpses = {name: glimpse_of_track(track) for name, track in assign_tracks(scheme, tracks).settled.items()}
         ticks = range(shot.first_tick, shot.first_tick + len(shot.times_s) - 1)
-        seen.append(Seen(float(shot.times_s[0]), ticks, glimpses))
+        seen.append(ObservedShot(float(shot.times_s[0]), ticks, glimpses))
     return seen
 
 
@@ -151,14 +153,14 @@ def _through_a_file(pictures: Iterator[Frame], shot: Shot, rate_hz: float) -> It
 
 
 def _goals(world: World, point: Point, seed: int) -> Integers:
-    """The goals of a rollout: all there are in random order, or one after the other from rollout to rollout."""
+    """The goals of a rollout: all of the world's in random order, or a part that moves on from rollout to rollout."""
     if point.goals == world.choices:
         return np.random.default_rng([_GOALS_STREAM, seed]).permutation(world.choices)
     return (seed + np.arange(point.goals)) % world.choices
 
 
 def _messages(world: World, point: Point, goals: Integers, seed: int) -> list[tuple[int, ...]]:
-    """The whole message's symbols of each message: the goals' digits, or random ones where goals do not fill them."""
+    """All symbols of each message: the goals' digits, or random symbols where there are more than the goals need."""
     size, digits = point.alphabet_size, point.goal_symbols
     spelled = [tuple(int(goal) // size**place % size for place in reversed(range(digits))) for goal in goals]
     if size ** (digits - 1) >= world.choices:
@@ -167,14 +169,14 @@ def _messages(world: World, point: Point, goals: Integers, seed: int) -> list[tu
     return [tuple(symbol for own in spelled for symbol in own)] if point.whole else spelled
 
 
-def _narrowed(seen: Sequence[Seen], scheme: Scheme) -> Sequence[Seen]:
-    """Without the axes that other channels move, for the scheme of one channel alone."""
+def _narrowed(seen: Sequence[ObservedShot], scheme: Scheme) -> Sequence[ObservedShot]:
+    """The same shots with the axes of the scheme's one channel only."""
     (channel,) = scheme.channels
     return [replace(one, glimpses={channel.body: own_axes(channel, one.glimpses[channel.body])}) for one in seen]
 
 
 def _decoded(
-    point: Point, secrets: Sequence[bytes], seen: Sequence[Seen], sent: Sequence[Sequence[int]], detector: str
+    point: Point, secrets: Sequence[bytes], seen: Sequence[ObservedShot], sent: Sequence[Sequence[int]], detector: str
 ) -> Iterator[tuple[str, float]]:
     """Names and values of one rollout's results under one detector; the first of the secrets is the right one."""
     truth = np.concatenate([np.asarray(symbols) for symbols in sent])
@@ -191,14 +193,16 @@ def _decoded(
         yield "wrong", float(sum((np.argmax(other, axis=1) == truth).sum() for other in others))
 
 
-def _genie_scores(codebook: Codebook, point: Point, seen: Sequence[Seen], sent: Sequence[Sequence[int]]) -> Floats:
+def _genie_scores(
+    codebook: Codebook, point: Point, seen: Sequence[ObservedShot], sent: Sequence[Sequence[int]]
+) -> Floats:
     """Log-likelihoods (symbols, M) of a single or "same" arrangement, all channels together."""
-    knowledge = _knowledge(point.world)
-    channels = zip(codebook.scheme.channels, lessons(codebook, seen, sent), strict=True)
-    return pooled_scores([genie_scores(knowledge, codebook, own, seen, channel) for channel, own in channels], GENIE)
+    model = _genie_model(point.world)
+    channels = zip(codebook.scheme.channels, known_shots(codebook, seen, sent), strict=True)
+    return pooled_scores([genie_scores(model, codebook, own, seen, channel) for channel, own in channels], GENIE)
 
 
-def _message_scores(codebook: Codebook, point: Point, seen: Sequence[Seen], detector: str) -> Floats:
+def _message_scores(codebook: Codebook, point: Point, seen: Sequence[ObservedShot], detector: str) -> Floats:
     """Scores (symbols, M) in the order of the messages' symbols, from those of each channel's windows."""
     scheme = codebook.scheme
     channels = read_windows(codebook, seen, point.messages, detector)

@@ -1,4 +1,8 @@
-"""The paper's tables of a simulated world, measured here, cell by cell."""
+"""The paper's tables of a simulated world, measured here.
+
+Its appendices "Discovery", "Lunar Lander", "Reacher" and "Football: Numerical Results" (tab:discovery-single-x to
+tab:football-indep) and "Null Conditions" (tab:null).
+"""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -8,11 +12,11 @@ import numpy as np
 from rich.console import Console
 from scipy.stats import fisher_exact
 
-from hil.experiments.detectors.paper_robomaster import Proportion
 from hil.experiments.runs.cells import Cell, CellStore, Values
+from hil.experiments.runs.proportion import Proportion
 from hil.experiments.runs.sweep import run_sweep
 from hil.experiments.worlds.genie import GENIE
-from hil.experiments.worlds.points import HEADLINES, PaperCell, Point, headline_point, paper_cells
+from hil.experiments.worlds.points import HEADLINES, PaperEntry, Point, headline_point, paper_entries
 from hil.experiments.worlds.reading import COHERENCY, MATCHED
 from hil.experiments.worlds.rollout import (
     FILE,
@@ -55,14 +59,14 @@ class Effort:
 
 @dataclass(frozen=True)
 class Condition:
-    """What is recorded: a point, how many rollouts, who reads them, and what is special about them."""
+    """What is recorded and how it is read; `arm`, `decoys` and `medium` are what differs from a plain rollout."""
 
     point: Point
     rollouts: int
     detectors: tuple[str, ...] = DETECTORS
     arm: str = SENT
     decoys: int = 0
-    frames: str = MEMORY
+    medium: str = MEMORY
 
 
 @dataclass(frozen=True)
@@ -80,13 +84,13 @@ class Row:
     goals: Proportion | None
     symbols: Proportion
     margin: float | None = None
-    paper: PaperCell | None = None
+    paper: PaperEntry | None = None
 
 
 def conditions_of(world: str, effort: Effort) -> list[Condition]:
     """What to record in a world: the paper's points, shorter messages, and the headline point in special ways."""
     headline = headline_point(world)
-    points = [cell.point for cell in paper_cells(world) if cell.point.arrangement not in _PARTS.get(world, ())]
+    points = [cell.point for cell in paper_entries(world) if cell.point.arrangement not in _PARTS.get(world, ())]
     shorter = [headline_point(world, ticks) for ticks in HEADLINES[world].shorter_ticks]
     if effort.quick:
         shortest = min(point.message_ticks for point in points)
@@ -104,7 +108,7 @@ def conditions_of(world: str, effort: Effort) -> list[Condition]:
         for point, count in rollouts.items()
     ]  # fmt: skip
     found.append(Condition(headline, effort.compared_rollouts, arm=NO_MESSAGE))
-    found.append(Condition(headline, min(_BATCH[world], effort.headline_rollouts), frames=FILE))
+    found.append(Condition(headline, min(_BATCH[world], effort.headline_rollouts), medium=FILE))
     return found
 
 
@@ -121,7 +125,7 @@ def measure(
     console: Console,
     workers: int | None = None,
 ) -> tuple[list[Row], float]:
-    """Record and read a world under the conditions; beside the rows the processor time that all of it took, seconds."""
+    """The rows of a world under the conditions, and the processor time, seconds, that all cells took."""
     groups = [_cells(world, condition, effort) for condition in conditions]
     results = run_sweep(decode_batch, [cell for group in groups for cell in group], store, console, workers)
     taken = iter(results)
@@ -164,7 +168,7 @@ def _cells(world: str, condition: Condition, effort: Effort) -> list[Cell]:
             "worlds",
             rollout_parameters(
                 condition.point, min(size, condition.rollouts - first), condition.detectors, arm=condition.arm,
-                decoys=condition.decoys, parts=parts, renderer=effort.renderer, frames=condition.frames,
+                decoys=condition.decoys, parts=parts, renderer=effort.renderer, medium=condition.medium,
             ),
             effort.first_seed + first,
         )
@@ -180,8 +184,8 @@ def _joined(results: Sequence[Values]) -> dict[str, list[float]]:
 
 def _rows(world: str, condition: Condition, results: dict[str, list[float]]) -> Iterator[Row]:
     recorded = condition.point
-    paper = {cell.point: cell for cell in paper_cells(world)}
-    arm = THROUGH_A_FILE if condition.frames == FILE else condition.arm
+    paper = {cell.point: cell for cell in paper_entries(world)}
+    arm = THROUGH_A_FILE if condition.medium == FILE else condition.arm
     for name in [name for name in results if name.endswith(" goals")]:
         detector, arrangement, _ = name.split(" ")
         point = recorded.of_arrangement(arrangement)

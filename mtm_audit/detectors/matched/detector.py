@@ -52,13 +52,17 @@ class MatchedDetector:
         motions, refusals = _motions([observation.glimpse for observation in observations], codebook)
         prepared = _prepared(motions)
         channels = {number: observations[number].channel for number in motions}
-        searched = _searched([codebook, *decoys], channels, prepared, onset, progress)
+        alone = _searched([codebook, *decoys], channels, prepared, onset, progress)
+        searched = _shared([codebook, *decoys], channels, prepared, alone, onset)
         for number in list(motions):
             refusal = _too_short(codebook, channels[number], prepared[number], searched[number][0].timing, onset)
             if refusal is not None:
                 refusals[number] = refusal
                 del motions[number]
         readings = self._read_together(codebook, channels, prepared, list(motions), searched, onset) if motions else {}
+        for number, reading in readings.items():
+            own = alone[number][0]
+            readings[number] = replace(reading, alone=own.timing, alone_strength=own.evidence)
         return [readings[number] if number in readings else refusals[number] for number in range(len(observations))]
 
     def strengths(
@@ -141,17 +145,29 @@ def _searched(
     onset: Onset,
     progress: Callable[[float], None] | None,
 ) -> dict[int, list[Found]]:
-    """For each robot, for each codebook the timing; robots whose windows are of one length share what they found."""
+    """For each robot, for each codebook the timing that its motion shows by itself."""
     searched: dict[int, list[Found]] = {}
     for row, (number, robot) in enumerate(prepared.items()):
         part = None if progress is None else _part_of(progress, row, len(prepared))
         played = [(codebook, channels[number]) for codebook in codebooks]
         searched[number] = search_timings(played, robot, onset, part)
+    return searched
+
+
+def _shared(
+    codebooks: Sequence[Codebook],
+    channels: dict[int, Channel],
+    prepared: dict[int, Prepared],
+    alone: dict[int, list[Found]],
+    onset: Onset,
+) -> dict[int, list[Found]]:
+    """The timings once robots whose windows are of one length know what each of them found."""
+    searched = dict(alone)
     lengths = {number: codebooks[0].scheme.window_ticks(channels[number]) for number in prepared}
     for length in dict.fromkeys(lengths.values()):
         fleet = [number for number, other in lengths.items() if other == length]
         if len(fleet) > 1:
-            members = [Member(channels[number], prepared[number], searched[number]) for number in fleet]
+            members = [Member(channels[number], prepared[number], alone[number]) for number in fleet]
             searched.update(zip(fleet, share_timings(codebooks, members, onset), strict=True))
     return searched
 

@@ -4,13 +4,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from mtm_audit.decoding.decode import DecodeSettings, decode_tracks
+from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.track import Track
+from mtm_audit.significance.evidence import Evidence
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.framing import number_of_symbols, symbols_of_number
 from tests.audit.moving_robot import OTHER_SECRET, key_of, robot_track, scheme_of
 
-KNOWN = DecodeSettings("coherency", onset_s=1.0, decoys=30)
+KNOWN = DecodeSettings(detector="coherency", onset_s=1.0, decoys=30)
 PAIR = key_of(scheme_of(symbols=(1, 1), ticks=400))
 SENT = (3, 1)
 
@@ -34,7 +36,7 @@ def test_a_message_is_decoded():
 
 
 def test_a_message_is_decoded_when_nobody_knows_when_it_began():
-    decoding = decode_tracks(pair(), PAIR, DecodeSettings("coherency", decoys=30))
+    decoding = decode_tracks(pair(), PAIR, DecodeSettings(detector="coherency", decoys=30))
     assert (decoding.verdict, decoding.message) == ("decoded", 13)
     for channel in decoding.channels:
         assert channel.reading is not None
@@ -48,7 +50,7 @@ def test_the_wrong_key_finds_nothing():
 
 
 def test_the_wrong_key_finds_nothing_however_long_it_searches():
-    decoding = decode_tracks(pair(), key_of(PAIR.scheme, OTHER_SECRET), DecodeSettings("coherency", decoys=30))
+    decoding = decode_tracks(pair(), key_of(PAIR.scheme, OTHER_SECRET), DecodeSettings(detector="coherency", decoys=30))
     assert (decoding.verdict, decoding.message) == ("absent", None)
 
 
@@ -56,23 +58,23 @@ def test_the_wrong_key_finds_nothing_however_long_it_searches():
 def test_a_recording_that_is_far_too_long_is_refused_before_the_search(late_s):
     tracks = tuple(replace(track, times_s=np.append(track.times_s[:-1], late_s)) for track in pair())
     with pytest.raises(MtmError, match="no more than 10000 s can be searched; .*seconds"):
-        decode_tracks(tracks, PAIR, DecodeSettings("coherency", decoys=8))
+        decode_tracks(tracks, PAIR, DecodeSettings(detector="coherency", decoys=8))
 
 
 def test_a_recording_shorter_than_a_tick_is_refused():
     tracks = tuple(replace(track, times_s=track.times_s * 1e-7) for track in pair())
     with pytest.raises(MtmError, match="no whole window"):
-        decode_tracks(tracks, PAIR, DecodeSettings("coherency", decoys=8))
+        decode_tracks(tracks, PAIR, DecodeSettings(detector="coherency", decoys=8))
 
 
 def test_a_robot_that_stands_still_says_nothing():
     tracks = tuple(replace(track, positions=np.ones_like(track.positions)) for track in pair())
-    assert decode_tracks(tracks, PAIR, DecodeSettings("coherency", decoys=8)).verdict == "absent"
+    assert decode_tracks(tracks, PAIR, DecodeSettings(detector="coherency", decoys=8)).verdict == "absent"
 
 
 @pytest.mark.parametrize("onset_s", [1.0, None])
 def test_robots_that_send_nothing_give_absent(onset_s):
-    decoding = decode_tracks(pair((None, None)), PAIR, DecodeSettings("coherency", onset_s=onset_s, decoys=12))
+    decoding = decode_tracks(pair((None, None)), PAIR, DecodeSettings(detector="coherency", onset_s=onset_s, decoys=12))
     assert (decoding.verdict, decoding.message) == ("absent", None)
 
 
@@ -122,7 +124,7 @@ def test_a_pooled_message_survives_a_missing_robot(pooling):
 def test_a_recording_that_starts_in_the_middle_of_a_message_is_read_all_the_same():
     key = key_of(scheme_of(symbols=(1, 1), ticks=400))
     tracks = [robot_track(key, f"robot{n}", (SENT[n],), 21.0, onset_s=-5.0, seed=n) for n in range(2)]
-    decoding = decode_tracks(tracks, key, DecodeSettings("coherency", decoys=30))
+    decoding = decode_tracks(tracks, key, DecodeSettings(detector="coherency", decoys=30))
     assert (decoding.verdict, decoding.symbols) == ("decoded", SENT)
 
 
@@ -132,26 +134,26 @@ SEVERAL = key_of(scheme_of(symbols=(2,), ticks=600))
 def test_a_repeated_message_whose_beginning_nobody_saw_is_not_put_together():
     """3 1 3 1 3 is the message 3 1 or the message 1 3: neither may be called decoded."""
     track = robot_track(SEVERAL, "robot0", (3, 1), 26.0, onset_s=-4.0)
-    decoding = decode_tracks([track], SEVERAL, DecodeSettings("coherency", decoys=30))
+    decoding = decode_tracks([track], SEVERAL, DecodeSettings(detector="coherency", decoys=30))
     assert sorted(decoding.symbols) == [1, 3]
     assert (decoding.verdict, decoding.message, decoding.order_known) == ("inconclusive", None, False)
 
 
 def test_a_repeated_message_is_put_together_when_its_beginning_is_given():
     track = robot_track(SEVERAL, "robot0", (3, 1), 26.0, onset_s=-4.0)
-    decoding = decode_tracks([track], SEVERAL, DecodeSettings("coherency", onset_s=8.0, decoys=30))
+    decoding = decode_tracks([track], SEVERAL, DecodeSettings(detector="coherency", onset_s=8.0, decoys=30))
     assert (decoding.verdict, decoding.symbols) == ("decoded", (3, 1))
 
 
 def test_a_message_of_several_symbols_that_is_sent_once_needs_no_onset():
     track = robot_track(SEVERAL, "robot0", (3, 1), 14.0, onset_s=1.0)
-    decoding = decode_tracks([track], SEVERAL, DecodeSettings("coherency", decoys=30))
+    decoding = decode_tracks([track], SEVERAL, DecodeSettings(detector="coherency", decoys=30))
     assert (decoding.verdict, decoding.symbols) == ("decoded", (3, 1))
 
 
 def test_the_order_of_equal_symbols_does_not_matter():
     track = robot_track(SEVERAL, "robot0", (2, 2), 26.0, onset_s=-4.0)
-    decoding = decode_tracks([track], SEVERAL, DecodeSettings("coherency", decoys=30))
+    decoding = decode_tracks([track], SEVERAL, DecodeSettings(detector="coherency", decoys=30))
     assert (decoding.verdict, decoding.symbols) == ("decoded", (2, 2))
 
 
@@ -201,7 +203,7 @@ def found_by_body(decoding):
 
 @pytest.mark.parametrize("onset_s", [1.0, None])
 def test_tracks_whose_names_say_nothing_are_matched_by_search(onset_s):
-    decoding = decode_tracks(strangers(), FLEET, DecodeSettings("coherency", onset_s=onset_s, decoys=20))
+    decoding = decode_tracks(strangers(), FLEET, DecodeSettings(detector="coherency", onset_s=onset_s, decoys=20))
     assert (decoding.verdict, decoding.symbols) == ("decoded", (3, 1, 2))
     assert found_by_body(decoding) == {"robot0": "thing b", "robot1": "thing c", "robot2": "thing a"}
     assert all(item.searched for item in decoding.channels)
@@ -211,7 +213,7 @@ def test_the_matched_detector_finds_each_body_s_track_too():
     key = key_of(scheme_of(symbols=(1, 1), ticks=200))
     shown = [robot_track(key, f"robot{n}", (SENT[n],), 5.0, onset_s=0.5, seed=n) for n in (1, 0)]
     crossed = [replace(track, name=name) for track, name in zip(shown, ("left", "right"), strict=True)]
-    decoding = decode_tracks(crossed, key, DecodeSettings("matched", 0.5, decoys=8, threshold=0.05))
+    decoding = decode_tracks(crossed, key, DecodeSettings(onset_s=0.5, threshold=0.05))
     assert (decoding.verdict, decoding.symbols) == ("decoded", SENT)
     assert found_by_body(decoding) == {"robot0": "right", "robot1": "left"}
 
@@ -219,7 +221,7 @@ def test_the_matched_detector_finds_each_body_s_track_too():
 @pytest.mark.parametrize("onset_s", [1.0, None])
 def test_the_wrong_key_finds_nothing_however_tracks_are_matched(onset_s):
     wrong = key_of(FLEET.scheme, OTHER_SECRET)
-    decoding = decode_tracks(strangers(), wrong, DecodeSettings("coherency", onset_s=onset_s, decoys=20))
+    decoding = decode_tracks(strangers(), wrong, DecodeSettings(detector="coherency", onset_s=onset_s, decoys=20))
     assert (decoding.verdict, decoding.message) == ("absent", None)
     assert decoding.evidence.p_value > 0.01
 
@@ -249,11 +251,11 @@ def test_the_strength_is_the_mean_of_the_channels_whichever_tracks_were_searched
     for tracks in (strangers(), (*strangers()[:2], replace(strangers()[2], name="robot1"))):
         decoding = decode_tracks(tracks, FLEET, replace(KNOWN, decoys=8))
         shown = [item.reading.strength for item in decoding.channels if item.reading is not None]
-        assert decoding.evidence.strength == pytest.approx(np.mean(shown))
+        assert decoding.evidence.decoys.strength == pytest.approx(np.mean(shown))
 
 
 def test_tracks_too_short_to_match_are_refused_in_a_sentence():
-    with pytest.raises(MtmError, match="no whole window"):
+    with pytest.raises(MtmError, match="no track can be read as any channel; record longer"):
         decode_tracks(strangers(seconds=4.0), FLEET, KNOWN)
     with pytest.raises(MtmError, match="at least 3"):
         decode_tracks([Track("dot", np.zeros(1), np.zeros((1, 2)), np.ones(1, bool))], PAIR, KNOWN)
@@ -261,10 +263,11 @@ def test_tracks_too_short_to_match_are_refused_in_a_sentence():
 
 def test_evidence_in_bits_is_what_the_p_value_says_unless_it_is_a_log_evidence():
     by_coherency = decode_tracks(pair(), PAIR, KNOWN)
-    assert by_coherency.evidence_bits == pytest.approx(-np.log2(by_coherency.evidence.p_value))
-    by_likelihood = decode_tracks(pair(), PAIR, replace(KNOWN, detector="matched", decoys=8))
-    nats = sum(item.reading.strength for item in by_likelihood.channels if item.reading is not None)
-    assert by_likelihood.evidence_bits == pytest.approx(nats / np.log(2.0))
+    assert by_coherency.evidence.nats is None
+    assert by_coherency.evidence.bits == pytest.approx(-np.log2(by_coherency.evidence.p_value))
+    by_likelihood = decode_tracks(pair(), PAIR, replace(KNOWN, detector="matched", decoys=None)).evidence
+    assert by_likelihood.bits == pytest.approx(by_likelihood.nats / np.log(2.0))
+    assert by_likelihood.p_value == pytest.approx(2.0**-by_likelihood.bits)
 
 
 def test_progress_is_told():
@@ -312,7 +315,8 @@ def test_evidence_near_the_limit_is_judged_by_more_decoys_and_only_then(monkeypa
 
     def decoded(tracks, key, settings, progress):
         tried.append(settings.decoys)
-        return replace(found, verdict="absent", evidence=replace(found.evidence, p_value=p_value), settings=settings)
+        evidence = Evidence(None, replace(found.evidence.decoys, p_value=p_value))
+        return replace(found, verdict="absent", evidence=evidence, settings=settings)
 
     monkeypatch.setattr("mtm_audit.decoding.decode._decoded", decoded)
     assert decode_tracks(pair(), PAIR, KNOWN).settings.decoys == looks[-1]

@@ -4,7 +4,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from mtm_audit.decoding.decode import DecodeSettings, decode_tracks
+from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.reporting.delivery import frame_sentences
 from mtm_onboard.protocol import MtmError
@@ -17,8 +18,7 @@ TAGGED = Framing("integer", 12, check="tag", check_bits=16, code="reed-solomon")
 # Two robots with five windows of 2 s each: 28 bits of data in seven of ten symbols of four bits.
 SCHEME = scheme_of(symbols=(5, 5), ticks=500, alphabet=16, framing=TAGGED)
 KEY = key_of(SCHEME)
-# Few decoys, so that it is quick; they leave p-values little room below a hundredth.
-SETTINGS = DecodeSettings("matched", decoys=8, threshold=0.02)
+SETTINGS = DecodeSettings()
 
 
 @cache

@@ -1,5 +1,6 @@
 """What a person is told beside the verdict: warnings, advice, and probabilities in words."""
 
+import math
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -9,11 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_audit.decoding.decode import DecodeSettings, decode_tracks
+from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.recording import Recording
 from mtm_audit.reporting.advice import advice
 from mtm_audit.reporting.remarks import remarks
 from mtm_audit.reporting.text import percent, rarity
+from mtm_audit.significance.evidence import Evidence
 from tests.audit.moving_robot import key_of, robot_track, scheme_of
 
 KEY = key_of(scheme_of(symbols=(1, 1), ticks=400))
@@ -28,7 +31,7 @@ def track(number=0, seconds=10.0, onset_s=1.0, rate_scale=1.0, rate_hz=100.0):
 
 def told(*tracks, onset_s=1.0, warnings=(), decoys=20):
     recording = Recording((Path("recording.tum"),), "motion capture", tracks, warnings)
-    decoding = decode_tracks(tracks, KEY, DecodeSettings("coherency", onset_s=onset_s, decoys=decoys))
+    decoding = decode_tracks(tracks, KEY, DecodeSettings(detector="coherency", onset_s=onset_s, decoys=decoys))
     return remarks(recording, decoding), advice(recording, decoding), decoding
 
 
@@ -38,9 +41,17 @@ def test_a_good_recording_needs_no_words():
 
 
 def test_what_the_file_warned_of_comes_first():
-    warnings, _, _ = told(track(0), warnings=("the file is damaged",))
+    warnings, sentences, _ = told(track(0), warnings=("the file is damaged",))
     assert warnings[0] == "the file is damaged"
-    assert len(warnings) == 2
+    assert warnings[1].startswith("no track shows robot1")
+    assert warnings[2:] == sentences
+
+
+def test_what_would_help_comes_last_among_the_warnings():
+    warnings, sentences, decoding = told(track(0))
+    assert decoding.verdict == "inconclusive"
+    assert len(sentences) == 1
+    assert warnings[-1:] == sentences
 
 
 def test_a_recording_shorter_than_a_message_is_remarked():
@@ -50,7 +61,10 @@ def test_a_recording_shorter_than_a_message_is_remarked():
 
 def test_a_channel_without_a_track_is_remarked():
     warnings, _, _ = told(track(1))
-    assert warnings == ("no track shows robot0, so channel robot0 was not read; film it, or use --assign",)
+    assert warnings == (
+        "no track shows robot0, so channel robot0 was not read; film it, or use --assign",
+        "not seen: symbol 0, which robot0 sends; record that robot too, or name its track with --assign",
+    )
 
 
 def test_a_frame_rate_below_twice_the_band_s_top_is_remarked():
@@ -75,23 +89,46 @@ def test_a_robot_out_of_sight_for_long_is_remarked():
 
 def test_a_track_too_short_to_read_is_remarked_beside_one_that_was_read():
     warnings, _, decoding = told(track(0), track(1, seconds=3.0))
-    assert any("track robot1 is too short to read channel robot1" in warning for warning in warnings)
+    assert any("the recording of 'robot1' holds no whole window of 8 s" in warning for warning in warnings)
+    assert decoding.channels[1].state == "too short"
     assert decoding.symbols[1] is None
 
 
-@pytest.mark.parametrize(("p_value", "sentences"), [(0.5, 1), (0.011, 1), (0.009, 2), (0.0002, 2)])
+@cache
+def of_a_silent_robot():
+    silent = robot_track(KEY, "robot0", None, 20.0)
+    return told(silent, decoys=20)[2]
+
+
+def said_with(evidence):
+    near = replace(of_a_silent_robot(), verdict="absent", evidence=evidence)
+    return advice(Recording((Path("recording.tum"),), "motion capture", (track(),)), near)
+
+
+NEAR_THE_LIMIT = [(0.5, 1), (0.011, 1), (0.009, 2), (0.0002, 2)]
+
+
+@pytest.mark.parametrize(("p_value", "sentences"), NEAR_THE_LIMIT)
 def test_a_message_that_is_nearly_found_is_not_passed_off_as_absent(p_value, sentences):
-    _, _, decoding = told(robot_track(KEY, "robot0", None, 20.0), decoys=20)
-    near = replace(decoding, verdict="absent", evidence=replace(decoding.evidence, p_value=p_value))
-    said = advice(Recording((Path("recording.tum"),), "motion capture", (track(),)), near)
+    said = said_with(Evidence(None, replace(of_a_silent_robot().evidence.decoys, p_value=p_value)))
     assert len(said) == sentences
     assert sentences == 1 or "more decoy keys (--decoys 100)" in said[1]
+
+
+@pytest.mark.parametrize(("p_value", "sentences"), NEAR_THE_LIMIT)
+@pytest.mark.parametrize("with_decoys", [False, True])
+def test_exact_evidence_near_the_limit_asks_for_no_decoys(p_value, sentences, with_decoys):
+    decoys = replace(of_a_silent_robot().evidence.decoys, p_value=0.4) if with_decoys else None
+    said = said_with(Evidence(-math.log(p_value), decoys))
+    assert len(said) == sentences
+    assert sentences == 1 or "do not take it for absent before a longer recording" in said[1]
+    assert "--decoys" not in " ".join(said)
 
 
 def test_an_absent_message_is_not_given_advice_about_symbols():
     wrong = key_of(KEY.scheme, b"one more fake secret, only tests")
     recording = Recording((Path("a.tum"),), "motion capture", (track(0), track(1)))
-    decoding = decode_tracks(recording.tracks, wrong, DecodeSettings("coherency", onset_s=1.0, decoys=20))
+    decoding = decode_tracks(recording.tracks, wrong, DecodeSettings(detector="coherency", onset_s=1.0, decoys=20))
     (sentence,) = advice(recording, decoding)
     assert "symbol" not in sentence
 
@@ -102,13 +139,13 @@ def test_an_absent_message_is_not_given_advice_about_symbols():
 )
 def test_the_advised_length_grows_with_the_doubt(posterior, words):
     recording = Recording((Path("a.tum"),), "motion capture", (track(0), track(1)))
-    decoding = decode_tracks(recording.tracks, KEY, DecodeSettings("coherency", onset_s=1.0, decoys=20))
+    decoding = decode_tracks(recording.tracks, KEY, DecodeSettings(detector="coherency", onset_s=1.0, decoys=20))
     posteriors = decoding.posteriors.copy()
     posteriors[1] = (1.0 - posterior) / 3.0
     posteriors[1, 2] = posterior
     doubtful = replace(decoding, verdict="inconclusive", message=None, posteriors=posteriors)
     (sentence,) = advice(recording, doubtful)
-    assert sentence.startswith("Uncertain: symbol 1 (less than 95% sure)")
+    assert sentence.startswith("uncertain: symbol 1; ")
     assert words in sentence
 
 

@@ -17,6 +17,7 @@ def test_the_table_comes_from_the_finished_cells_with_its_command_line(tmp_path,
     assert "of 100 frames 60 read right and 1 wrong, 1 expected of 65536 tries" in capsys.readouterr().out
     with out.open() as file:
         assert next(file).startswith("# mtm-hil frames -n 200 --seed 0 --out ")
+        assert next(file).startswith("# code ")
         rows = list(csv.DictReader(file))
     assert len(rows) == 12 + 8 + 18
     assert (rows[0]["what"], rows[0]["check_bits"], rows[0]["wrong"]) == ("noise", "16", "1")

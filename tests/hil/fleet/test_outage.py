@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mtm_audit.decoding.decode import DecodeSettings, decode_tracks
+from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.reporting.journal_summary import injected_noise, summary_of
 from mtm_onboard.journal.journal import Journal
 from mtm_onboard.links.reconnecting import ReconnectingTransport
@@ -45,7 +46,7 @@ def outage(tmp_path_factory):
 
 def test_the_windows_that_were_sent_still_decode(outage):
     track, _ = outage
-    decoding = decode_tracks((track,), KEY, DecodeSettings("coherency", onset_s=0.0, decoys=30))
+    decoding = decode_tracks((track,), KEY, DecodeSettings(detector="coherency", onset_s=0.0, decoys=30))
     assert (decoding.verdict, decoding.symbols) == ("decoded", SYMBOLS)
 
 

@@ -72,7 +72,7 @@ def test_a_slow_wire_keeps_the_order_and_the_least_delay(wire):
 def test_a_wire_that_swallows_takes_everything_and_gives_nothing(wire):
     wire.swallows = True
     assert carried(wire) == []
-    wire.mend()
+    wire.restore()
     assert carried(wire) == UNITS
 
 
@@ -88,7 +88,7 @@ def test_a_cut_can_bus_is_off_for_us_and_loses_what_was_under_way(wire):
         with pytest.raises(can.CanOperationError, match="bus off"):
             use()
     assert theirs.recv() is None
-    wire.mend()
+    wire.restore()
     ours.send(frame(b"ab"))
     received = theirs.recv()
     assert (received.arbitration_id, bytes(received.data)) == (0x201, b"ab")
@@ -106,7 +106,7 @@ def test_a_cut_line_fails_for_us_alone(wire):
     for use in (lambda: ours.write(b"command;", 0.0), ours.read):
         with pytest.raises(MtmError, match="unplugged"):
             use()
-    wire.mend()
+    wire.restore()
     assert ours.read() == b""
     theirs.push(b"ok;")
     assert ours.read() == b"ok;"
@@ -123,7 +123,7 @@ def test_a_cut_port_fails_for_us_alone_and_what_waited_at_its_end_is_gone(wire):
         with pytest.raises(MtmError, match="unplugged"):
             use()
     theirs.write(b"heartbeat")
-    wire.mend()
+    wire.restore()
     assert (ours.read(), theirs.read()) == (b"", b"")
 
 

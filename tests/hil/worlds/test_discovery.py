@@ -76,15 +76,15 @@ def test_the_agent_goes_at_the_speed_of_the_command() -> None:
     rollout = WORLD.run(np.array([[0, 4]]), np.zeros((1, 2, 40, 2)), [0])[0]
     speeds_mps = np.linalg.norm(np.diff(_states(rollout), axis=0), axis=1) * WORLD.rate_hz
     assert speeds_mps.max() == pytest.approx(1.0, abs=0.15)
-    assert np.linalg.norm(rollout.conduct.base, axis=1).max() == pytest.approx(1.0)
+    assert np.linalg.norm(rollout.control.base, axis=1).max() == pytest.approx(1.0)
 
 
 def test_noise_comes_upon_the_command_and_the_limit_upon_both() -> None:
     noise = np.full((1, 1, 20, 2), -1.2)
-    conduct = WORLD.run(np.array([[6]]), noise, [0])[0].conduct
-    assert np.allclose(conduct.asked - conduct.base, -1.2)
-    assert np.array_equal(conduct.sent, np.clip(conduct.asked, -1.0, 1.0))
-    assert np.any(conduct.sent != conduct.asked)
+    control = WORLD.run(np.array([[6]]), noise, [0])[0].control
+    assert np.allclose(control.requested - control.base, -1.2)
+    assert np.array_equal(control.applied, np.clip(control.requested, -1.0, 1.0))
+    assert np.any(control.applied != control.requested)
 
 
 def test_the_agent_stays_where_the_camera_need_not_zoom_out() -> None:
@@ -96,7 +96,7 @@ def test_the_agent_stays_where_the_camera_need_not_zoom_out() -> None:
 def test_the_task_leaves_the_distance_of_the_paper_with_noise_and_without() -> None:
     silent = np.zeros((10, WORLD.task_ticks, 2))
     for noise in (silent, _noise(10, 1, WORLD.task_ticks)[:, 0]):
-        left_m = [conduct.scores[FINAL_DISTANCE] for conduct in WORLD.perform(noise, range(10))]
+        left_m = [control.scores[FINAL_DISTANCE] for control in WORLD.perform(noise, range(10))]
         assert np.mean(left_m) == pytest.approx(0.24, abs=0.05)
 
 

@@ -7,7 +7,7 @@ import pytest
 from hil.worlds import football
 from hil.worlds.football import LIMIT, MEAN_DISTANCE, SCORED, Football
 from hil.worlds.football_pictures import PICTURE_PX, TEAM_BGR, draw
-from hil.worlds.football_team import STRATEGIES, Sight, Team, strategies
+from hil.worlds.football_team import STRATEGIES, GameState, Team, strategies
 from mtm_onboard.protocol import MtmError
 
 torch = pytest.importorskip("torch")
@@ -31,7 +31,7 @@ def played(sigma):
 def sight(own_xy_m, ball_xy_m=(0.0, 0.0), games=STRATEGIES):
     own = np.tile(np.asarray(own_xy_m, dtype=float), (games, 1, 1))
     ball = np.tile(np.asarray(ball_xy_m, dtype=float), (games, 1))
-    return Sight(own, np.zeros_like(own), ball, np.zeros_like(ball))
+    return GameState(own, np.zeros_like(own), ball, np.zeros_like(ball))
 
 
 def kicked_off(places_m):
@@ -54,15 +54,15 @@ def test_the_same_call_gives_the_same_rollouts():
 
 def test_noise_is_added_to_every_action_and_what_is_sent_is_clamped():
     for rollout, own in zip(played(0.3), noise(0.3), strict=True):
-        conduct = rollout.conduct
-        assert np.allclose(conduct.asked - conduct.base, own[0])
-        assert np.array_equal(conduct.sent, np.clip(conduct.asked, -LIMIT, LIMIT))
-        assert np.abs(conduct.asked).max() > LIMIT
+        control = rollout.control
+        assert np.allclose(control.requested - control.base, own[0])
+        assert np.array_equal(control.applied, np.clip(control.requested, -LIMIT, LIMIT))
+        assert np.abs(control.requested).max() > LIMIT
 
 
 def test_without_noise_nothing_is_clamped():
     for rollout in played(0.0):
-        assert np.array_equal(rollout.conduct.base, rollout.conduct.sent)
+        assert np.array_equal(rollout.control.base, rollout.control.applied)
 
 
 def test_noise_moves_the_agents_from_the_second_frame_on():
@@ -92,7 +92,7 @@ def test_after_a_goal_play_goes_on_from_a_kick_off(monkeypatch):
 
     monkeypatch.setattr(football, "_environment", just_before_a_goal)
     rollouts = Football().run(np.zeros((3, 1), dtype=int), noise(0.0), SEEDS)
-    assert [rollout.conduct.scores[SCORED] for rollout in rollouts] == [0.0, 1.0, 0.0]
+    assert [rollout.control.scores[SCORED] for rollout in rollouts] == [0.0, 1.0, 0.0]
     states = rollouts[1].shots[0].states
     (jump,) = np.flatnonzero(np.linalg.norm(np.diff(states[:, 12:], axis=0), axis=1) > 0.5)
     after = states[jump + 1].reshape(7, 2)
@@ -103,10 +103,10 @@ def test_after_a_goal_play_goes_on_from_a_kick_off(monkeypatch):
 
 
 def test_the_measures_of_the_task_are_the_balls_distance_and_whether_the_team_scored():
-    for conduct in Football().perform(noise(0.0)[:, 0], SEEDS):
-        assert set(conduct.scores) == {MEAN_DISTANCE, SCORED}
-        assert 0.0 < conduct.scores[MEAN_DISTANCE] < 3.1
-        assert conduct.scores[SCORED] in (0.0, 1.0)
+    for control in Football().perform(noise(0.0)[:, 0], SEEDS):
+        assert set(control.scores) == {MEAN_DISTANCE, SCORED}
+        assert 0.0 < control.scores[MEAN_DISTANCE] < 3.1
+        assert control.scores[SCORED] in (0.0, 1.0)
 
 
 def test_arrays_that_do_not_belong_together_and_strategies_that_do_not_exist_are_refused():
@@ -131,7 +131,9 @@ def test_every_strategy_moves_its_team_in_its_own_way():
     # Long enough for passes, which are played every 5 or 15 s.
     for _ in range(60):
         scene = sight(generator.uniform(-0.4, 0.6, (3, 2)))
-        moving = Sight(scene.own_xy_m, scene.own_mps + generator.uniform(-0.1, 0.1, 2), scene.ball_xy_m, scene.ball_mps)
+        moving = GameState(
+            scene.own_xy_m, scene.own_mps + generator.uniform(-0.1, 0.1, 2), scene.ball_xy_m, scene.ball_mps
+        )
         actions.append(team.actions(chosen, moving))
     flat = np.stack(actions, axis=1).reshape(STRATEGIES, -1)
     assert len(np.unique(np.round(flat, 9), axis=0)) == STRATEGIES

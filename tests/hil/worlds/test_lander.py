@@ -16,6 +16,7 @@ from mtm_onboard.protocol import Codebook, MtmError
 lunar_lander = pytest.importorskip("gymnasium.envs.box2d.lunar_lander")
 lander = pytest.importorskip("hil.worlds.lander")
 pictures = pytest.importorskip("hil.worlds.lander_pictures")
+states = pytest.importorskip("hil.worlds.lander_states")
 
 SECRET = b"not a real secret, only for test"
 SCHEME = same_scheme("lunar-lander", 8, 192, 1)
@@ -30,7 +31,7 @@ def rollout(*pads, seed=3):
 
 
 def bodies(shot):
-    return shot.states[:, lander.TERRAIN_POINTS :].reshape(len(shot.states), -1, 3)[:, : lander.BODIES]
+    return shot.states[:, states.TERRAIN_POINTS :].reshape(len(shot.states), -1, 3)[:, : states.BODIES]
 
 
 def tracked(frames):
@@ -61,7 +62,7 @@ def test_the_lander_hovers_over_its_pad_in_view_and_above_all_terrain():
         hull = bodies(shot)[:, 0]
         assert hull[-1, 0] == pytest.approx(lander.PADS_X_M[pad], abs=1.5)
         assert np.all(np.abs(hull[:, 1] - lander.HOVER_Y_M) < 1.5)
-        assert shot.states[0, : lander.TERRAIN_POINTS].max() < hull[:, 1].min() - 1.0
+        assert shot.states[0, : states.TERRAIN_POINTS].max() < hull[:, 1].min() - 1.0
 
 
 def test_a_rollout_comes_again_from_its_seed_and_another_descends_over_other_terrain():
@@ -71,12 +72,12 @@ def test_a_rollout_comes_again_from_its_seed_and_another_descends_over_other_ter
 
 
 def test_the_engines_get_the_noise_within_their_limits():
-    conduct = rollout(6, 1).conduct
+    control = rollout(6, 1).control
     noise = keyed_noise(Codebook(SECRET, SCHEME), [[6], [1]], WORLD.axes)
-    assert conduct.asked - conduct.base == pytest.approx(noise)
-    assert np.array_equal(conduct.sent, np.clip(conduct.asked, -1.0, 1.0))
-    assert np.any(conduct.sent != conduct.asked)
-    assert conduct.scores["ended goals"] == 0.0
+    assert control.requested - control.base == pytest.approx(noise)
+    assert np.array_equal(control.applied, np.clip(control.requested, -1.0, 1.0))
+    assert np.any(control.applied != control.requested)
+    assert control.scores["ended goals"] == 0.0
 
 
 def test_the_motion_is_that_of_the_environment_as_it_comes_with_its_flames():
@@ -85,7 +86,7 @@ def test_the_motion_is_that_of_the_environment_as_it_comes_with_its_flames():
     for _ in range(lander.WARM_UP_TICKS):
         side, main = lander.hover_action(environment.lander, lander.PADS_X_M[6])
         environment.step(np.array([main, side]))
-    for side, main in rollout(6, 1).conduct.asked[:192]:
+    for side, main in rollout(6, 1).control.requested[:192]:
         environment.step(np.array([main, side]))
     expected = [(*body.position, body.angle) for body in environment.drawlist]
     assert np.array_equal(bodies(rollout(6, 1).shots[0])[-1], expected)
@@ -94,7 +95,7 @@ def test_the_motion_is_that_of_the_environment_as_it_comes_with_its_flames():
 def test_a_goal_that_gymnasium_ends_is_counted_and_filmed_to_its_end():
     noise = np.full((1, 1, 150, 2), (0.0, -5.0))
     fallen = WORLD.run(np.array([[0]]), noise, [1])[0]
-    assert fallen.conduct.scores["ended goals"] == 1.0
+    assert fallen.control.scores["ended goals"] == 1.0
     assert len(fallen.shots[0].states) == 151
 
 
@@ -135,7 +136,7 @@ def test_a_video_file_decodes_as_the_pictures_in_memory_do(tmp_path):
 
 def test_flames_are_drawn_where_the_main_engine_blew_them():
     shot = rollout(6, 1).shots[0]
-    flames = shot.states[100, lander.TERRAIN_POINTS :].reshape(-1, 3)[lander.BODIES :]
+    flames = shot.states[100, states.TERRAIN_POINTS :].reshape(-1, 3)[states.BODIES :]
     youngest = flames[~np.isnan(flames[:, 0])][np.argmax(flames[~np.isnan(flames[:, 0])][:, 2])]
     column, row = int(youngest[0] * 30.0), 399 - int(youngest[1] * 30.0)
     blue, green, red = drawn(0)[100].image[row, column].astype(int)
@@ -151,14 +152,14 @@ def test_native_pictures_without_pygame_say_what_to_install(monkeypatch):
 
 def test_the_engines_are_shut_off_once_both_legs_stand():
     noise = 0.5 * np.random.default_rng(8).standard_normal((1, WORLD.task_ticks, 2))
-    (conduct,) = WORLD.perform(noise, [5])
-    assert np.all(conduct.asked[0] - conduct.base[0] == pytest.approx(noise[0, 0]))
-    assert np.array_equal(conduct.sent[-1], (0.0, 0.0))
-    assert conduct.scores["episodic return"] > 200.0
+    (control,) = WORLD.perform(noise, [5])
+    assert np.all(control.requested[0] - control.base[0] == pytest.approx(noise[0, 0]))
+    assert np.array_equal(control.applied[-1], (0.0, 0.0))
+    assert control.scores["episodic return"] > 200.0
 
 
 def test_a_clean_landing_earns_what_gymnasium_calls_a_solution():
-    conducts = WORLD.perform(np.zeros((2, WORLD.task_ticks, 2)), [1, 2])
-    for conduct in conducts:
-        assert conduct.scores["episodic return"] > 200.0
-        assert len(conduct.base) < WORLD.task_ticks
+    histories = WORLD.perform(np.zeros((2, WORLD.task_ticks, 2)), [1, 2])
+    for control in histories:
+        assert control.scores["episodic return"] > 200.0
+        assert len(control.base) < WORLD.task_ticks

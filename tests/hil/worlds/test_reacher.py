@@ -47,7 +47,7 @@ def inner_scores(codebook: Codebook, track: Track) -> Floats:
 def test_the_mean_action_brings_the_fingertip_to_the_target_from_any_pose(world: Reacher) -> None:
     goals = np.arange(8).reshape(8, 1)
     rollouts = world.run(goals, np.full((8, 1, 50, 2), ALMOST_NOTHING), range(8))
-    misses_m = [rollout.conduct.scores["final distance (m)"] for rollout in rollouts]
+    misses_m = [rollout.control.scores["final distance (m)"] for rollout in rollouts]
     assert np.mean(misses_m) < 0.02
 
 
@@ -67,8 +67,8 @@ def test_keyed_noise_takes_the_place_of_the_policys_own(world: Reacher) -> None:
     asked = []
     for eps in (1.0, -0.5):
         (rollout,) = world.run(np.array([[0]]), np.full((1, 1, 1, 2), eps), [1])
-        asked.append(rollout.conduct.asked[0] - np.arctanh(rollout.conduct.base[0]))
-        assert rollout.conduct.sent == pytest.approx(np.tanh(rollout.conduct.asked))
+        asked.append(rollout.control.requested[0] - np.arctanh(rollout.control.base[0]))
+        assert rollout.control.applied == pytest.approx(np.tanh(rollout.control.requested))
     assert np.all(asked[0] > 0)
     assert asked[1] == pytest.approx(-0.5 * asked[0])
 
@@ -79,8 +79,8 @@ def test_an_axis_without_keyed_noise_keeps_the_policys_own(world: Reacher) -> No
     (unkeyed,) = world.run(goals, noise, [1])
     noise[..., 0] = 1.0
     (inner_keyed,) = world.run(goals, noise, [1])
-    assert unkeyed.conduct.sent[0, 1] == inner_keyed.conduct.sent[0, 1] != inner_keyed.conduct.base[0, 1]
-    assert unkeyed.conduct.sent[0, 0] != inner_keyed.conduct.sent[0, 0]
+    assert unkeyed.control.applied[0, 1] == inner_keyed.control.applied[0, 1] != inner_keyed.control.base[0, 1]
+    assert unkeyed.control.applied[0, 0] != inner_keyed.control.applied[0, 0]
 
 
 def test_the_return_pays_for_distance_and_squared_action(world: Reacher) -> None:
@@ -88,8 +88,8 @@ def test_the_return_pays_for_distance_and_squared_action(world: Reacher) -> None
     still, keyed = (
         world.perform(np.full((12, 50, 2), level), seeds) for level in (ALMOST_NOTHING, 4.0)
     )  # fmt: skip
-    returns = np.array([[conduct.scores["50-step return"] for conduct in group] for group in (still, keyed)])
-    penalties = [0.1 * float(np.square(conduct.sent).sum()) for conduct in still]
+    returns = np.array([[control.scores["50-step return"] for control in group] for group in (still, keyed)])
+    penalties = [0.1 * float(np.square(control.applied).sum()) for control in still]
     assert np.all(returns[0] < np.negative(penalties))
     assert returns[0].mean() > -6
     assert returns[1].mean() < returns[0].mean() - 1

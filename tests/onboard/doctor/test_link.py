@@ -60,7 +60,7 @@ def test_a_serial_line_that_another_program_has_is_a_failure(serial_line):
 
 def test_what_is_no_serial_line_is_a_failure(tmp_path):
     (tmp_path / "file").touch()
-    assert "no serial line" in check_serial(str(tmp_path / "file")).text
+    assert "not a serial line" in check_serial(str(tmp_path / "file")).text
     assert "plug it in" in check_serial(str(tmp_path / "nowhere")).text
 
 

@@ -47,8 +47,9 @@ def test_both_ways_to_the_statistics_are_the_direct_sums(seed, axes, observed_ax
     waveforms = np.einsum("lak,pkn->lpan", tones, heard)
     information = np.einsum("lpan,dn->dlpa", waveforms, pulled)
     precision = np.einsum("lpan,lpbn,dn->dlpab", waveforms, waveforms, weights)
-    for summarise in (_from_waveforms, _from_tones):
-        found = summarise(tones.reshape(5 * axes, 6), axes, heard, pulled, weights)
+    by_tones = _from_tones(tones.reshape(5 * axes, 6), axes, heard, pulled, weights)
+    by_waveforms = _from_waveforms(waveforms.transpose(1, 0, 2, 3), pulled, weights)
+    for found in (by_waveforms, by_tones):
         assert found.information == pytest.approx(information)
         assert found.precision == pytest.approx(precision)
 

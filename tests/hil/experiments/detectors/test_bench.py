@@ -11,7 +11,7 @@ from hil.experiments.detectors.bench_recording import ONSET_S, Job, record
 from hil.experiments.detectors.bench_rollout import COHERENCY, GENIE, MATCHED
 from hil.experiments.detectors.bench_summary import crossing, isotonic, shortest_window, summary
 from hil.experiments.detectors.capacity import capacity_bps
-from hil.experiments.detectors.paper_robomaster import Proportion
+from hil.experiments.runs.proportion import Proportion
 from hil.plants.mecanum import calibrated_parameters
 from mtm_audit.detectors.matched.motion import Motion
 

@@ -11,8 +11,8 @@ from hil.experiments.detectors.genie import (
     ORDER,
     Interference,
     fit_interference,
-    heard_cells,
     log_likelihoods,
+    responding_bins,
     tick_responses,
 )
 from hil.plants.mecanum import MecanumPlant, calibrated_parameters
@@ -93,9 +93,9 @@ def test_the_interference_that_was_put_in_is_found():
 
 
 def test_only_cells_that_hear_the_window_are_compared():
-    heard = heard_cells(tick_responses(PLANT, 1.0, 50.0, 50, still(200)))
-    assert heard.start == 26 - ORDER
-    assert 50 + ORDER < heard.stop < 100
+    bins = responding_bins(tick_responses(PLANT, 1.0, 50.0, 50, still(200)))
+    assert bins.start == 26 - ORDER
+    assert 50 + ORDER < bins.stop < 100
 
 
 def test_on_a_chassis_that_hardly_slips_every_symbol_of_many_comes_through():

@@ -4,9 +4,10 @@ import io
 import pytest
 from rich.console import Console
 
-from hil.experiments.detectors.paper_robomaster import Proportion, measure, rich_table, write_csv
+from hil.experiments.detectors.paper_robomaster import measure, rich_table, write_csv
 from hil.experiments.detectors.robomaster_rollout import NO_MESSAGE, SENT, WRONG_KEY, decode_rollout, rollout_parameters
 from hil.experiments.runs.cells import CellStore
+from hil.experiments.runs.proportion import Proportion
 from hil.plants.mecanum import calibrated_parameters
 
 QUIET = Console(file=io.StringIO(), width=100)
@@ -40,8 +41,8 @@ def test_a_rollout_repeats_under_its_seed_and_differs_under_another():
 
 
 def test_the_file_begins_with_the_command_and_agrees_with_the_rows(rows, tmp_path):
-    write_csv(tmp_path / "a.csv", rows, ("mtm-hil paper robomaster -n 3", "a plant"))
-    first, second, *lines = (tmp_path / "a.csv").read_text().splitlines()
+    write_csv(tmp_path / "a.csv", rows, "mtm-hil paper robomaster -n 3", ("a plant",))
+    first, _, second, *lines = (tmp_path / "a.csv").read_text().splitlines()
     assert (first, second) == ("# mtm-hil paper robomaster -n 3", "# a plant")
     read = list(csv.DictReader(lines))
     assert [row["arm"] for row in read] == ["message", "wrong key", "no message"]

@@ -14,12 +14,12 @@ from hil.experiments.hardening.faults import (
     FAULTS,
     LOSSES,
     WIRES,
-    Line,
     Outcome,
+    Row,
     assess,
     fault_cell,
     fault_cells,
-    line_of,
+    row_of,
 )
 from hil.experiments.runs.cells import Cell, CellStore
 from mtm_onboard.model.velocity import STOP, BodyVelocity
@@ -28,9 +28,9 @@ from mtm_onboard.protocol.journal_file import NOISE, UNSENT, JournalHeader, Jour
 FINE = Outcome(0, 0.02, 0.2, 0.2, 0.27, 1, 8, 6, True, True, 1e-6)
 
 
-def measured(wire: str, fault: str, loss: str) -> Line:
+def measured(wire: str, fault: str, loss: str) -> Row:
     cell = Cell("faults", {"wire": wire, "fault": fault, "loss": loss}, 3)
-    return line_of(cell, fault_cell(cell.parameters, cell.seed))
+    return row_of(cell, fault_cell(cell.parameters, cell.seed))
 
 
 @pytest.mark.parametrize(
@@ -107,9 +107,9 @@ def test_a_window_that_the_robot_cannot_follow_was_not_sent():
     assert (result["windows"], result["sent"], result["message_is_due"]) == (8, 4, True)
 
 
-def judged(wire: str = "can", loss: str = "cut", **changes) -> Line:
+def judged(wire: str = "can", loss: str = "cut", **changes) -> Row:
     cell = Cell("faults", {"wire": wire, "fault": "none", "loss": loss}, 0)
-    return line_of(cell, vars(replace(FINE, **changes)))
+    return row_of(cell, vars(replace(FINE, **changes)))
 
 
 @pytest.mark.parametrize(
@@ -141,9 +141,10 @@ def test_the_table_comes_from_the_finished_cells_and_a_bad_one_is_told(tmp_path,
             bad = cell.parameters == {"wire": "can", "fault": "drop", "loss": ""}
             store.add(cell, vars(replace(FINE, silent_stop_s=0.5 if bad else 0.27)))
     assert not faults(1, 0, 1, out, cells, Console())
-    assert "81 runs, 1 of them not as they should be" in capsys.readouterr().out
+    assert "81 runs, 1 of them failed" in capsys.readouterr().out
     with out.open() as file:
         assert next(file).startswith("# mtm-hil faults -n 1 --seed 0 --out ")
+        assert next(file).startswith("# code ")
         rows = list(csv.DictReader(file))
     assert [row["fault"] for row in rows if row["stops"] == "False"] == ["drop"]
     assert {row["lost_deadline_s"] for row in rows if row["wire"] == "plaintext"} == {"none"}

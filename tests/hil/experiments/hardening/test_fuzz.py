@@ -22,7 +22,7 @@ def fuzzed(target: str, seed: int = 7, inputs: int = INPUTS):
 @pytest.mark.parametrize("name", TARGETS)
 def test_damaged_traffic_crashes_nothing_and_is_obeyed_only_where_it_reads_as_whole(name):
     result = fuzzed(name)
-    assert (result["failure"], result["crashes"], result["deaf"], result["unsent"]) == ("", 0, 0, 0)
+    assert (result["failure"], result["crashes"], result["unresponsive"], result["unsent"]) == ("", 0, 0, 0)
     assert result["inputs"] == INPUTS + 4  # each session ends with a filler and a sound message
     assert result["whole"] > 10
     # Among as few as these no damaged frame passes a checksum of 16 bits; text has none.
@@ -50,7 +50,7 @@ def test_a_reader_that_says_what_it_read_again_is_found_out(monkeypatch):
     assert fuzzed("plaintext robot", inputs=250)["unsent"] > 0
 
 
-def test_a_crash_and_a_deaf_end_are_found_out(monkeypatch):
+def test_a_crash_and_an_unresponsive_end_are_found(monkeypatch):
     decode = MavlinkCodec.decode
     monkeypatch.setattr(MavlinkCodec, "decode", lambda self, data: [] if len(data) > 60 else decode(self, data))
     assert fuzzed("mavlink vehicle", inputs=250)["crashes"] == 0
@@ -59,7 +59,7 @@ def test_a_crash_and_a_deaf_end_are_found_out(monkeypatch):
     assert result["crashes"] == 1
     assert "ZeroDivisionError" in result["failure"]
     monkeypatch.setattr(MavlinkCodec, "decode", lambda self, data: [])
-    assert fuzzed("mavlink vehicle", inputs=250)["deaf"] == 1
+    assert fuzzed("mavlink vehicle", inputs=250)["unresponsive"] == 1
 
 
 def test_the_cells_suffice_for_the_inputs_asked_and_are_shared_out_evenly():

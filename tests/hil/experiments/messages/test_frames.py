@@ -8,15 +8,15 @@ from hil.experiments.messages.frames import (
     NOISE,
     THRESHOLDS,
     frame_cells,
-    line_of,
     read_frames,
+    row_of,
 )
 from hil.experiments.runs.cells import Cell
 
 
 def one_cell(what, code="reed-solomon", check="tag", bits=32, distance=0.0):
     parameters = {"what": what, "code": code, "check": check, "check_bits": bits, "distance": distance}
-    return line_of([Cell("frames", parameters, 3)], [read_frames(parameters, 3)])
+    return row_of([Cell("frames", parameters, 3)], [read_frames(parameters, 3)])
 
 
 @pytest.mark.parametrize("code", CODES)

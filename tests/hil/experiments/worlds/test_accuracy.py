@@ -1,8 +1,8 @@
 import pytest
 
 from hil.experiments.detectors.accuracy_rollout import WHOLE
-from hil.experiments.detectors.accuracy_table import WORLDS
 from hil.experiments.worlds.accuracy import read_world, world_parameters, world_scheme
+from hil.experiments.worlds.accuracy_table import WORLDS
 from mtm_onboard.protocol import MtmError
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hil.experiments.worlds.reading import COHERENCY, MATCHED, Seen, pooled_scores, read_windows
+from hil.experiments.worlds.reading import COHERENCY, MATCHED, ObservedShot, pooled_scores, read_windows
 from hil.worlds.noise import keyed_noise
 from hil.worlds.schemes import same_scheme, split_scheme
 from mtm_audit.model.glimpse import Glimpse
@@ -16,7 +16,7 @@ def moved(body, noise, rate_hz, start_s=0.0, first_tick=0):
     trembling = 0.2 * noise.std() * np.random.default_rng(first_tick).standard_normal(noise.shape)
     edges_s = start_s + np.arange(len(noise) + 1) / rate_hz
     glimpse = Glimpse(body, edges_s, noise + trembling, np.ones(len(noise), dtype=bool), ("x", "y"))
-    return Seen(start_s, range(first_tick, first_tick + len(noise)), {body: glimpse})
+    return ObservedShot(start_s, range(first_tick, first_tick + len(noise)), {body: glimpse})
 
 
 @pytest.mark.parametrize("detector", [COHERENCY, MATCHED])

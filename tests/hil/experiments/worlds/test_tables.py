@@ -3,8 +3,8 @@ import csv
 import pytest
 
 from hil.cli import main
-from hil.experiments.detectors.paper_robomaster import Proportion
-from hil.experiments.worlds.points import headline_point, paper_cells
+from hil.experiments.runs.proportion import Proportion
+from hil.experiments.worlds.points import headline_point, paper_entries
 from hil.experiments.worlds.report import against_the_paper
 from hil.experiments.worlds.rollout import NO_MESSAGE
 from hil.experiments.worlds.tables import Effort, Row, conditions_of, shortest_ticks
@@ -74,12 +74,12 @@ def test_all_rollouts_of_the_headline_and_a_part_of_the_others_are_asked_for():
     conditions = conditions_of("reacher", Effort(50, 50, 5, 0))
     counts = {condition.point: condition.rollouts for condition in conditions if condition.arm != NO_MESSAGE}
     assert counts[headline_point("reacher", 60)] == 50
-    assert counts[next(cell.point for cell in paper_cells("reacher") if cell.point.arrangement == "split")] == 5
+    assert counts[next(cell.point for cell in paper_entries("reacher") if cell.point.arrangement == "split")] == 5
 
 
 @pytest.mark.parametrize(("right", "verdict"), [(400, "higher"), (316, "agrees"), (200, "lower")])
 def test_a_cell_is_held_against_the_paper_s_by_their_intervals(right, verdict):
-    cell = next(cell for cell in paper_cells("discovery") if cell.percent == 79.0)
+    cell = next(cell for cell in paper_entries("discovery") if cell.percent == 79.0)
     goals = Proportion(right, 400)
     assert against_the_paper(Row("message", cell.point, "coherency", 50, goals, goals, 0.1, cell)) == verdict
 

@@ -1,4 +1,4 @@
-"""Accuracy tables of simulated worlds, as `mtm-audit plan` reads them."""
+"""Accuracy tables of simulated worlds, as `mtm-audit plan` reads them: a_c(t, M) of the paper's "Design Space"."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -7,8 +7,8 @@ from functools import partial
 from rich.console import Console
 
 from hil.experiments.detectors.accuracy_rollout import WHOLE, read_rollout, rollout_parameters
-from hil.experiments.detectors.paper_robomaster import Proportion
 from hil.experiments.runs.cells import Cell, CellStore, Scalar, Values
+from hil.experiments.runs.proportion import Proportion
 from hil.experiments.runs.sweep import Compute, run_sweep
 from hil.experiments.worlds.accuracy import read_world, world_parameters, world_scheme
 from hil.plants.mecanum import calibrated_parameters
@@ -20,7 +20,7 @@ from mtm_onboard.protocol import MtmError, Scheme
 
 @dataclass(frozen=True)
 class World:
-    """What a sweep needs of a world: a scheme of so many equal windows, M and t, and how a rollout of it is read.
+    """What a sweep needs of a world: a scheme of M, t and a number of equal windows, and how a rollout of it is read.
 
     `compute` gets what `parameters` makes of scheme and detector, and gives the symbols right by channel name, pooled
     ones included, and whether the `WHOLE` message was.

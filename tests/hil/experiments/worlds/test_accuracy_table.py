@@ -5,7 +5,7 @@ import pytest
 
 from hil.cli import main
 from hil.experiments.detectors.accuracy_rollout import WHOLE, read_rollout, rollout_parameters
-from hil.experiments.detectors.accuracy_table import grid
+from hil.experiments.worlds.accuracy_table import grid
 from hil.plants.mecanum import calibrated_parameters
 from hil.worlds.robomaster import fleet_scheme
 from mtm_audit.planning.table import read_table

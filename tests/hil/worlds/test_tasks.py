@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from hil.fleet.lockstep import run_lockstep
-from hil.worlds.errands import ERRANDS, any_errand
 from hil.worlds.robomaster import routes
+from hil.worlds.tasks import TASKS, random_task
 from tests.hil.fleet.short_runs import short_run
 
 SECONDS = 12.0
@@ -15,7 +15,7 @@ ROUTE = routes((0, 1, 2, 3))[0]
 @cache
 def driven(name, seed=1):
     """A run of four robots on one errand, without a message."""
-    return run_lockstep(short_run(symbols=None, seconds=SECONDS, seed=seed, task=ERRANDS[name]))
+    return run_lockstep(short_run(symbols=None, seconds=SECONDS, seed=seed, task=TASKS[name]))
 
 
 def velocities_mps(name, robot=0, seed=1):
@@ -31,22 +31,22 @@ def band_mps(velocities, low_hz, high_hz):
     return np.sqrt(2.0 * spectrum[inside].sum(axis=0)) / len(velocities)
 
 
-@pytest.mark.parametrize("name", ERRANDS)
+@pytest.mark.parametrize("name", TASKS)
 def test_every_errand_is_driven_without_a_fault_and_within_the_limits(name):
     assert all(robot.is_clean and robot.clamped == 0 for robot in driven(name).robots)
 
 
-@pytest.mark.parametrize("name", ERRANDS)
+@pytest.mark.parametrize("name", TASKS)
 def test_an_errand_moves_the_robot_and_keeps_it_within_two_metres_and_a_half(name):
     for trajectory in driven(name).trajectories:
         away_m = np.linalg.norm(trajectory.positions_xy_m - trajectory.positions_xy_m[0], axis=1)
         assert 0.05 < away_m.max() < 2.5
 
 
-@pytest.mark.parametrize("name", [name for name in ERRANDS if name != "zigzag"])
+@pytest.mark.parametrize("name", [name for name in TASKS if name != "zigzag"])
 def test_an_errand_is_another_one_for_another_seed_and_the_same_for_the_same(name):
-    ours, others = ERRANDS[name](ROUTE, 1), ERRANDS[name](ROUTE, 2)
-    again = ERRANDS[name](ROUTE, 1)
+    ours, others = TASKS[name](ROUTE, 1), TASKS[name](ROUTE, 2)
+    again = TASKS[name](ROUTE, 1)
     commands = [[task.command((-0.5, -1.5), 0.0) for _ in range(200)] for task in (ours, others, again)]
     assert commands[0] == commands[2]
     assert commands[0] != commands[1]
@@ -54,7 +54,7 @@ def test_an_errand_is_another_one_for_another_seed_and_the_same_for_the_same(nam
 
 def test_a_stop_and_go_robot_stands_still_between_its_drives():
     commands = []
-    task, position = ERRANDS["stop and go"](ROUTE, 3), np.array(ROUTE.start_xy_m)
+    task, position = TASKS["stop and go"](ROUTE, 3), np.array(ROUTE.start_xy_m)
     for _ in range(600):
         command = task.command((position[0], position[1]), 0.0)
         commands.append(np.hypot(command.vx_mps, command.vy_mps))
@@ -83,7 +83,7 @@ def test_an_exploring_robot_is_as_loud_in_the_band_as_one_with_a_message():
     assert np.all(loud > 1.3 * quiet)
     alone = np.array([
         (command.vx_mps, command.vy_mps)
-        for task in [ERRANDS["explore"](ROUTE, 5)]
+        for task in [TASKS["explore"](ROUTE, 5)]
         for command in [task.command(ROUTE.start_xy_m, 0.0) for _ in range(1500)]
     ])  # fmt: skip
     assert band_mps_of_ticks(alone) == pytest.approx(0.1, rel=0.15)
@@ -104,5 +104,5 @@ def test_a_hovering_robot_is_thrown_and_comes_back():
 
 
 def test_robots_of_one_run_are_given_different_errands():
-    kinds = {type(any_errand(ROUTE, seed)).__name__ for seed in range(40)}
-    assert len(kinds) == len(ERRANDS)
+    kinds = {type(random_task(ROUTE, seed)).__name__ for seed in range(40)}
+    assert len(kinds) == len(TASKS)

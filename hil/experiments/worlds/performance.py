@@ -1,4 +1,7 @@
-"""What the noise costs the task: the paper's measures, and what it did not measure, of driven rollouts."""
+"""What the noise costs the task: the paper's appendix "Task Performance Preservation" (tab:reward-impact).
+
+Beside the paper's measures: energy, jerk, and how often a command is at its limit.
+"""
 
 import json
 from collections.abc import Sequence
@@ -10,17 +13,17 @@ from rich.console import Console
 from rich.table import Table
 
 from hil.experiments.runs.cells import Cell, CellStore, Scalar, Values
-from hil.experiments.runs.commented_csv import write_commented_csv
+from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 from hil.experiments.worlds.points import SAME, headline_point
 from hil.worlds.noise import keyed_noise, white_noise
 from hil.worlds.registry import make_world
-from hil.worlds.world import Conduct
+from hil.worlds.world import ControlHistory
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol import Codebook
 
 CLEAN, WHITE, KEYED = "clean", "white noise", "watermarked"
-# The paper's table "Clean controller vs. equal-amplitude WGN vs. watermarked": mean and spread.
+# tab:reward-impact: mean and standard deviation.
 PAPER: dict[tuple[str, str], dict[str, str]] = {
     ("discovery", "final distance to goal, m"): {
         CLEAN: "0.2404±0.0479", WHITE: "0.2420±0.0499", KEYED: "0.2403±0.0481",
@@ -56,34 +59,34 @@ class Measure:
 
 
 def conditions_of(world: str) -> tuple[str, ...]:
-    """A stochastic policy has no clean controller."""
+    """The conditions of a world; a stochastic policy has no clean controller."""
     return (WHITE, KEYED) if world == "reacher" else (CLEAN, WHITE, KEYED)
 
 
 def perform_batch(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """Measures of the rollouts of `seed` and those after it, by name, each a JSON list."""
+    """Measures by name, each a JSON list with a number for each rollout, of `seed` and the seeds after it."""
     name, condition, batch = str(parameters["world"]), str(parameters["condition"]), int(parameters["batch"])
     world = make_world(name)
     seeds = range(seed, seed + batch)
     noise = np.stack([_noise(name, condition, world.axes, world.task_ticks, own) for own in seeds])
     results: dict[str, list[float]] = {}
-    for conduct in world.perform(noise, seeds):
-        for measure, value in measures(name, conduct, world.rate_hz).items():
+    for control in world.perform(noise, seeds):
+        for measure, value in measures(name, control, world.rate_hz).items():
             results.setdefault(measure, []).append(value)
     return {measure: json.dumps(values) for measure, values in results.items()}
 
 
-def measures(world: str, conduct: Conduct, rate_hz: float) -> dict[str, float]:
+def measures(world: str, control: ControlHistory, rate_hz: float) -> dict[str, float]:
     """The task's own scores, and of the commands: mean square, root mean square jerk, share at the limit.
 
     Commands are in units of the world's action, so jerk is in that unit per second to the power of how many
     derivatives lie between (one of a force, two of a velocity).
     """
-    sent = conduct.sent
+    sent = control.applied
     jerks = np.diff(sent, n=3 - _INTEGRATIONS[world], axis=0) * rate_hz ** (3 - _INTEGRATIONS[world])
-    limited = (np.abs(conduct.asked - sent) > 1e-6) & (np.abs(sent) > 0.99)
+    limited = (np.abs(control.requested - sent) > 1e-6) & (np.abs(sent) > 0.99)
     return {
-        **conduct.scores,
+        **control.scores,
         "energy, mean square command": float(np.mean(np.sum(sent**2, axis=1))),
         "jerk, root mean square": float(np.sqrt(np.mean(jerks**2))),
         "commands at the limit": float(np.mean(limited)),
@@ -93,9 +96,9 @@ def measures(world: str, conduct: Conduct, rate_hz: float) -> dict[str, float]:
 def measure(
     worlds: Sequence[str], rollouts: int, first_seed: int, store: CellStore, console: Console, workers: int | None
 ) -> list[Measure]:
-    """All measures of all conditions; the same seeds under each."""
+    """All measures under all conditions, with the same seeds under each."""
     cells = [
-        (world, condition, _cell_of(world, condition, first_seed + first, min(_BATCH[world], rollouts - first)))
+        (world, condition, _cell(world, condition, first_seed + first, min(_BATCH[world], rollouts - first)))
         for world in worlds
         for condition in conditions_of(world)
         for first in range(0, rollouts, _BATCH[world])
@@ -111,8 +114,8 @@ def measure(
     ]
 
 
-def _cell_of(world: str, condition: str, seed: int, batch: int) -> Cell:
-    return Cell("conduct", {"world": world, "condition": condition, "batch": batch}, seed)
+def _cell(world: str, condition: str, seed: int, batch: int) -> Cell:
+    return Cell("performance", {"world": world, "condition": condition, "batch": batch}, seed)
 
 
 def _noise(world: str, condition: str, axes: Sequence[str], ticks: int, seed: int) -> Floats:
@@ -137,21 +140,21 @@ def rich_table(rows: Sequence[Measure]) -> Table:
         table.add_column(name, justify="left" if name in ("world", "measure") else "right")
     for world, name in dict.fromkeys((row.world, row.name) for row in rows):
         own = {row.condition: row for row in rows if (row.world, row.name) == (world, name)}
-        table.add_row(world, name, *(_cell(own.get(condition)) for condition in (CLEAN, WHITE, KEYED)))
+        table.add_row(world, name, *(_text_of(own.get(condition)) for condition in (CLEAN, WHITE, KEYED)))
     return table
 
 
-def _cell(row: Measure | None) -> str:
+def _text_of(row: Measure | None) -> str:
     if row is None:
         return ""
     return f"{row.mean:.4g}±{row.deviation:.3g}" + (f" ({row.paper})" if row.paper else "")
 
 
-def write_csv(path: Path, rows: Sequence[Measure], comments: Sequence[str]) -> None:
-    """Write the rows after the comments, of which the first is the command line."""
+def write_csv(path: Path, rows: Sequence[Measure], command: str) -> None:
+    """Write the rows under the command line."""
     columns = ("world", "measure", "condition", "rollouts", "mean", "standard_deviation", "paper")
-    cells = [
+    lines = [
         (row.world, row.name, row.condition, row.rollouts, f"{row.mean:.5g}", f"{row.deviation:.4g}", row.paper)
         for row in rows
     ]
-    write_commented_csv(path, comments, columns, cells)
+    write_result_csv(path, command, columns, lines)

@@ -1,4 +1,4 @@
-"""What else a robot may be busy with: tasks whose motion has another character than the paper's zigzag.
+"""Tasks of a RoboMaster whose motion has other statistics than the paper's zigzag.
 
 All drive the same chassis at its control rate; where they go and when is drawn from the robot's seed.
 """
@@ -32,7 +32,7 @@ class Hover:
         self._velocity_mps = [0.0, 0.0]
 
     def command(self, position_xy_m: Point, heading_rad: float) -> BodyVelocity:
-        """Kick, thrust, and go on at the velocity that comes of it."""
+        """The velocity after this tick's random kick and the thrust against it."""
         kicked = self._draw.random() < self._KICKS_PER_S * _PERIOD_S
         for axis in range(2):
             velocity = self._velocity_mps[axis]
@@ -58,7 +58,7 @@ class Orbit:
         self._centre_m = (x_m + self._radius_m * math.cos(angle_rad), y_m + self._radius_m * math.sin(angle_rad))
 
     def command(self, position_xy_m: Point, heading_rad: float) -> BodyVelocity:
-        """Along the circle, and back to it."""
+        """The velocity along the circle plus a correction towards it."""
         x_m, y_m = position_xy_m[0] - self._centre_m[0], position_xy_m[1] - self._centre_m[1]
         back_per_s = self._GAIN_PER_S * (self._radius_m / max(math.hypot(x_m, y_m), 1e-6) - 1.0)
         turn_radps = self._turn_radps
@@ -79,7 +79,7 @@ class StopAndGo:
         self._waits = 0
 
     def command(self, position_xy_m: Point, heading_rad: float) -> BodyVelocity:
-        """Wait, or drive on."""
+        """Zero while it waits, otherwise the velocity towards the next point."""
         x_m, y_m = self._goal_m[0] - position_xy_m[0], self._goal_m[1] - position_xy_m[1]
         distance_m = math.hypot(x_m, y_m)
         if self._waits:
@@ -98,7 +98,7 @@ class StopAndGo:
 
 
 class Reciprocate:
-    """Goes to and fro like a joint: strokes in one direction, whose length wanders, at a pace in the noise's band."""
+    """Moves back and forth along one direction like a joint, with strokes of varying length at a rate in the band."""
 
     def __init__(self, route: Route, draw: np.random.Generator) -> None:
         self._start_m = route.start_xy_m
@@ -110,7 +110,7 @@ class Reciprocate:
         self._speed_mps = 0.3
 
     def command(self, position_xy_m: Point, heading_rad: float) -> BodyVelocity:
-        """Flat strokes with rounded turns, drawn back gently to where they began."""
+        """The stroke's velocity, a clipped sine, plus a weak pull towards the start."""
         self._phase_rad += self._step_rad
         self._speed_mps += 0.02 * (0.3 - self._speed_mps) + 0.01 * self._draw.standard_normal()
         speed_mps = self._speed_mps * max(-1.0, min(1.0, 1.6 * math.sin(self._phase_rad)))
@@ -121,7 +121,7 @@ class Reciprocate:
 
 
 class Explore:
-    """A stochastic policy that explores with coloured Gaussian noise of its own: as loud as a message, in its band."""
+    """A stochastic policy with coloured Gaussian exploration noise of its own, in a message's band and at its power."""
 
     _BAND_HZ = (0.5, 5.0)
     _SIGMA_MPS = 0.1
@@ -135,28 +135,28 @@ class Explore:
         self._tick = 0
 
     def command(self, position_xy_m: Point, heading_rad: float) -> BodyVelocity:
-        """The mean action and the noise of this tick, which comes again after 40 s."""
+        """The mean action plus the noise of this tick, which repeats every 40 s."""
         mean = self._mean.command(position_xy_m, heading_rad)
         vx_mps, vy_mps = self._noise_mps[self._tick % self._SAMPLES]
         self._tick += 1
         return BodyVelocity(mean.vx_mps + vx_mps, mean.vy_mps + vy_mps, mean.wz_radps)
 
 
-def _drawn(task: type[Hover] | type[Orbit] | type[StopAndGo] | type[Reciprocate] | type[Explore]) -> TaskFactory:
+def _seeded(task: type[Hover] | type[Orbit] | type[StopAndGo] | type[Reciprocate] | type[Explore]) -> TaskFactory:
     return lambda route, seed: task(route, np.random.default_rng([_STREAM, seed]))
 
 
-ERRANDS: dict[str, TaskFactory] = {
+TASKS: dict[str, TaskFactory] = {
     "zigzag": go_to_goal,
-    "hover": _drawn(Hover),
-    "orbit": _drawn(Orbit),
-    "stop and go": _drawn(StopAndGo),
-    "reciprocate": _drawn(Reciprocate),
-    "explore": _drawn(Explore),
+    "hover": _seeded(Hover),
+    "orbit": _seeded(Orbit),
+    "stop and go": _seeded(StopAndGo),
+    "reciprocate": _seeded(Reciprocate),
+    "explore": _seeded(Explore),
 }
 
 
-def any_errand(route: Route, seed: int) -> Task:
-    """One of `ERRANDS`, drawn from the robot's seed."""
-    chosen = np.random.default_rng([_STREAM, seed, 1]).choice(list(ERRANDS))
-    return ERRANDS[str(chosen)](route, seed)
+def random_task(route: Route, seed: int) -> Task:
+    """The task of `TASKS` that the robot's seed draws."""
+    chosen = np.random.default_rng([_STREAM, seed, 1]).choice(list(TASKS))
+    return TASKS[str(chosen)](route, seed)

@@ -1,0 +1,200 @@
+"""The command lines of `mtm-hil`'s experiments; what each does is loaded when it is asked for."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hil.commands.options import CELLS_FOLDER, Cells, CellSeed, FirstSeed, OutCsv, Workers, reported_console
+
+
+def calibrate(
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each slip and window length.")] = 20,
+    out: Annotated[Path | None, typer.Option(help="The plant's file; that of the package by default.")] = None,
+    cells: Cells = CELLS_FOLDER / "calibrate.jsonl",
+) -> None:
+    """Fit the simulated chassis' wheel slip to the paper's margins."""
+    with reported_console() as console:
+        from hil.commands.calibrate import calibrate as run
+
+        run(rollouts, out, cells, console)
+
+
+def bench(
+    rollouts: Annotated[int, typer.Option(min=1, help="Rollouts of the main conditions; slow ones take fewer.")] = 200,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A few rollouts of some conditions, for a first look.")
+    ] = False,
+    out: OutCsv = None,
+    plot: Annotated[Path | None, typer.Option(help="A picture to draw: accuracy over the window length.")] = None,
+    cells: Cells = CELLS_FOLDER / "bench.jsonl",
+) -> None:
+    """Compare the paper's detector and ours with the genie, an oracle, on the same recordings."""
+    with reported_console() as console:
+        from hil.commands.bench import BenchOptions
+        from hil.commands.bench import bench as run
+
+        run(BenchOptions(rollouts, quick, out, plot, cells), console)
+
+
+def false_alarms(
+    decodes: Annotated[int, typer.Option("-n", min=4, help="Decodes with a wrong key, and as many without.")] = 3000,
+    detector: Annotated[str, typer.Option(help="Which detector decodes.")] = "matched",
+    seed: FirstSeed = 500_000,
+    workers: Workers = None,
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "false-alarms.jsonl",
+) -> None:
+    """Decode recordings without a message under the given key, and compare the p-values with a uniform law."""
+    with reported_console() as console:
+        from hil.commands.false_alarms import false_alarms as run
+
+        run(decodes, detector, seed, workers, out, cells, console)
+
+
+def messages(
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Messages of the first kind; fewer of the others.")] = 200,
+    seed: FirstSeed = 700_000,
+    workers: Workers = None,
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "messages.jsonl",
+) -> None:
+    """Count how many framed messages are received: whole, with a known time, and through occlusions."""
+    with reported_console() as console:
+        from hil.commands.messages import messages as run
+
+        run(rollouts, seed, workers, out, cells, console)
+
+
+def frames(
+    count: Annotated[int, typer.Option("-n", min=200, help="Frames under noise for each check.")] = 10_000,
+    seed: CellSeed = 0,
+    workers: Workers = None,
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "frames.jsonl",
+) -> None:
+    """Decode noisy and attacked frames: how often a wrong payload passes the check, and which decoder reads most."""
+    with reported_console() as console:
+        from hil.commands.frames import frames as run
+
+        run(count, seed, workers, out, cells, console)
+
+
+def shim(
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts, each run with Python and with the shim.")] = 100,
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "shim.jsonl",
+) -> None:
+    """Play the message with the microcontroller's C code, in the loop, and compare with Python."""
+    with reported_console() as console:
+        from hil.commands.shim import shim as run
+
+        run(rollouts, out, cells, console)
+
+
+def robustness(
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts under each condition.")] = 100,
+    seed: FirstSeed = 600_000,
+    workers: Workers = None,
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "robustness.jsonl",
+) -> None:
+    """Decode the same rollouts under uncalibrated cameras, frame times and clocks."""
+    with reported_console() as console:
+        from hil.commands.robustness import robustness as run
+
+        run(rollouts, seed, workers, out, cells, console)
+
+
+def sweep(
+    world: Annotated[
+        str,
+        typer.Argument(metavar="WORLD", help="The world: robomaster, discovery, lunar-lander, reacher or football."),
+    ],
+    out: Annotated[Path, typer.Option(help="The accuracy table to write, for mtm-audit plan.")],
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each M and window.")] = 50,
+    alphabet: Annotated[
+        list[int] | None, typer.Option(metavar="M", help="Alphabet size; may be repeated (default: 4, 16, 64).")
+    ] = None,
+    window: Annotated[
+        list[int] | None,
+        typer.Option(metavar="TICKS", min=1, help="Window; may be repeated (default: 30, 45, 60, 80, 110, 150)."),
+    ] = None,
+    windows: Annotated[int, typer.Option(min=1, help="Windows in a row, about as many as a message will have.")] = 2,
+    scheme: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Measure this scheme's own windows, and whole messages.")
+    ] = None,
+    detector: Annotated[str, typer.Option(help="Which detector decodes: matched or coherency.")] = "matched",
+    first_seed: FirstSeed = 700_000,
+    workers: Workers = None,
+    cells: Cells = CELLS_FOLDER / "sweep.jsonl",
+) -> None:
+    """Measure how often a symbol is right, by channel, alphabet size and window length."""  # fmt: skip
+    with reported_console() as console:
+        from hil.commands.sweep import SweepOptions
+        from hil.commands.sweep import sweep as run
+
+        options = SweepOptions(
+            world,
+            rollouts,
+            tuple(alphabet or ()),
+            tuple(window or ()),
+            windows,
+            scheme,
+            detector,
+            first_seed,
+            workers,
+            out,
+            cells,
+        )
+        run(options, console)
+
+
+def faults(
+    seeds: Annotated[int, typer.Option("-n", min=1, help="Runs of each combination of wire, fault and loss.")] = 3,
+    seed: Annotated[int, typer.Option(min=0, help="The first run's seed.")] = 0,
+    workers: Workers = None,
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "faults.jsonl",
+) -> None:
+    """Run a robot under every fault of its wire, alone and with a lost link: stops, stale commands, the message."""
+    with reported_console() as console:
+        from hil.commands.faults import faults as run
+
+        if not run(seeds, seed, workers, out, cells, console):
+            raise typer.Exit(1)
+
+
+def fuzz(
+    inputs: Annotated[int, typer.Option("-n", min=1, help="Inputs, over all ends of all wires.")] = 1_000_000,
+    seed: CellSeed = 0,
+    workers: Workers = None,
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "fuzz.jsonl",
+) -> None:
+    """Feed damaged traffic to both ends of every wire, and count the messages that they accept."""
+    with reported_console() as console:
+        from hil.commands.fuzz import fuzz as run
+
+        if not run(inputs, seed, workers, out, cells, console):
+            raise typer.Exit(1)
+
+
+def endurance(
+    hours: Annotated[float, typer.Option(min=0.0, help="Simulated hours.")] = 24.0,
+    checkpoints: Annotated[int, typer.Option(min=1, help="Number of checkpoints, evenly spaced up to the end.")] = 24,
+    seed: Annotated[int, typer.Option(min=0, help="Decides where the robot goes and how its wheels slip.")] = 0,
+    out: OutCsv = None,
+) -> None:
+    """Run one robot for a day in simulated time: memory, journal, ticks, and the message in each last minute."""
+    with reported_console() as console:
+        from hil.commands.endurance import endurance as run
+
+        run(hours, checkpoints, seed, out, console)
+
+
+# In the order in which --help lists them.
+EXPERIMENTS: tuple[Callable[..., None], ...] = (
+    calibrate, bench, false_alarms, messages, frames, shim, robustness, sweep, faults, fuzz, endurance,
+)  # fmt: skip
