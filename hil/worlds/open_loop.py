@@ -45,7 +45,8 @@ def steering(count: int, step_s: float, draw: np.random.Generator) -> Floats:
 def spinning(count: int, step_s: float, draw: np.random.Generator) -> Floats:
     """A smooth course while the body turns at 1 rad/s, so that its axes sweep through the world."""
     course = wander(count, step_s, draw)
-    angle = np.arange(count) * step_s
+    # The heading in the middle of each step, which is what moves the body.
+    angle = (np.arange(count) + 0.5) * step_s
     cosine, sine = np.cos(angle), np.sin(angle)
     ahead = cosine * course[:, 0] + sine * course[:, 1]
     left = cosine * course[:, 1] - sine * course[:, 0]
