@@ -19,6 +19,7 @@ from hil.commands.options import (
     require_message_or_none,
 )
 from hil.commands.paper_cli import paper
+from hil.commands.verdicts_cli import verdicts
 
 app = typer.Typer(
     help="Robots that send messages through motion, simulated with the real onboard software in the loop.",
@@ -106,6 +107,7 @@ def demo(out: NewFolder) -> None:
 for _experiment in EXPERIMENTS:
     app.command()(_experiment)
 app.add_typer(paper, name="paper")
+app.add_typer(verdicts, name="verdicts")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

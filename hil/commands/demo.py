@@ -17,7 +17,7 @@ from hil.fleet.programs import SINGLE_THREADED, program
 from mtm_onboard.protocol import MtmError
 
 MESSAGE = 0b10110010
-SECONDS = 26
+SECONDS = 15
 PLOT = "decode.png"
 _AT_ONCE = 2
 _VERDICT_CODES = (0, 3, 4)

@@ -17,6 +17,8 @@ from mtm_onboard.protocol.scheme import Channel
 
 # Prior probability that a track shows the body that its name says, where there are others.
 _NAMED = 0.9
+# Less than this is what a search among tracks finds by chance, and not worth reading all channels again.
+_WORTH_NATS = 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +79,7 @@ def exchanged(
     moved = {
         body: tracks[place] for body, place in found.items() if tracks[place] is not association.glimpses.get(body)
     }
-    if not moved:
+    if not moved or _gain(moved, association, tracks, channels, strengths) < _WORTH_NATS:
         return None
     others = max(1, len(tracks) - 1)
     costs = {
@@ -90,6 +92,24 @@ def exchanged(
         log_priors={**association.log_priors, **costs},
         exchanged=frozenset(moved) - association.searched,
     )
+
+
+def _gain(
+    moved: Mapping[str, Glimpse],
+    association: Association,
+    tracks: Sequence[Glimpse],
+    channels: Sequence[Channel],
+    strengths: Floats,
+) -> float:
+    """How much more log evidence the moved bodies' channels have in their new tracks than in today's."""
+    columns = {id(track): column for column, track in enumerate(tracks)}
+    gain = 0.0
+    for row, channel in enumerate(channels):
+        if channel.body in moved:
+            before = columns.get(id(association.glimpses.get(channel.body)))
+            old = 0.0 if before is None else float(np.nan_to_num(strengths[row, before], nan=0.0))
+            gain += float(strengths[row, columns[id(moved[channel.body])]]) - old
+    return gain
 
 
 def shown_elsewhere(

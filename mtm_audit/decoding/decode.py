@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import softmax
 
 from mtm_audit.decoding.assignment import assign_tracks
-from mtm_audit.decoding.decoding import CERTAIN, ChannelDecoding, ChannelState, Decoding
+from mtm_audit.decoding.decoding import ChannelDecoding, ChannelState, Decoding
 from mtm_audit.decoding.frames import Delivered, Heard, decode_frames
 from mtm_audit.decoding.leaps import without_leaps
 from mtm_audit.decoding.order import order_is_known
@@ -15,11 +15,11 @@ from mtm_audit.decoding.pooling import pooled_posteriors, pooled_symbols
 from mtm_audit.decoding.readings import Progress, Readings, read_tracks
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.decoding.start import start_of
+from mtm_audit.decoding.verdict import is_present, judged
 from mtm_audit.detectors import make_detector
 from mtm_audit.model.stage import stage
 from mtm_audit.model.track import Floats, Track
 from mtm_audit.significance.evidence import needed_nats
-from mtm_onboard.protocol.framing import Payload, number_of_symbols
 from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.scheme import Channel, Scheme
 
@@ -57,14 +57,13 @@ def _decoded(tracks: Sequence[Track], key: Key, settings: DecodeSettings, progre
     with stage("timing"):
         start = start_of(scheme, tracks, settings.onset_s, settings.at)
     readings = read_tracks(assignment, key, detector, settings.decoy_count, settings.threshold, start, progress)
-    needed = needed_nats(settings.threshold, scheme.alphabet_size, scheme.message_symbols)
-    channels = tuple(_channel_decoding(channel, readings, scheme, needed) for channel in scheme.channels)
+    channels = tuple(_channel_decoding(channel, readings, scheme) for channel in scheme.channels)
     order_known = settings.onset_s is not None or all(
         order_is_known(decoding.reading, decoding.channel, scheme.schedule)
         for decoding in channels
         if decoding.reading is not None
     )
-    present = readings.evidence.p_value <= settings.threshold
+    present = is_present(readings.evidence, settings.threshold)
     frames: tuple[Delivered, ...] = ()
     posteriors, symbols = _message_symbols(scheme, channels)
     symbols, symbol_nats = _weighed_symbols(symbols, readings)
@@ -73,13 +72,13 @@ def _decoded(tracks: Sequence[Track], key: Key, settings: DecodeSettings, progre
         frames = decode_frames(_heard(readings, scheme), scheme, key.secret, start.first_slot, order_known=order_known)
         posteriors, symbols = _frame_symbols(frames[-1])
         symbol_nats = (None,) * len(symbols)
-    undecided = Decoding(
-        verdict="inconclusive" if present else "absent",
+    weighed = Decoding(
+        verdict="absent",
         message=None,
         symbols=symbols,
         posteriors=posteriors,
         symbol_nats=symbol_nats,
-        needed_nats=needed,
+        needed_nats=needed_nats(settings.threshold, scheme.alphabet_size, scheme.message_symbols),
         order_known=order_known,
         evidence=readings.evidence,
         channels=channels,
@@ -89,21 +88,7 @@ def _decoded(tracks: Sequence[Track], key: Key, settings: DecodeSettings, progre
         scheme=scheme,
         settings=settings,
     )
-    message = _message_of(undecided) if present else None
-    return undecided if message is None else replace(undecided, verdict="decoded", message=message)
-
-
-def _message_of(decoding: Decoding) -> Payload | None:
-    """What a present message says; None when that is uncertain."""
-    framing = decoding.scheme.framing
-    if framing is not None:
-        read = decoding.frames[-1].message
-        # Without a check the order of the symbols and the likeliest codeword are all there is.
-        sure = read.check_passed or (framing.check == "none" and decoding.order_known and read.posterior >= CERTAIN)
-        return read.payload if sure else None
-    if decoding.uncertain or not decoding.order_known:
-        return None
-    return number_of_symbols([symbol for symbol in decoding.symbols if symbol is not None], decoding.scheme)
+    return judged(weighed, settings.threshold)
 
 
 def _weighed_symbols(
@@ -136,7 +121,7 @@ def _frame_symbols(frame: Delivered) -> tuple[Floats, tuple[int | None, ...]]:
     return softmax(ratios, axis=1), symbols
 
 
-def _channel_decoding(channel: Channel, readings: Readings, scheme: Scheme, needed: float) -> ChannelDecoding:
+def _channel_decoding(channel: Channel, readings: Readings, scheme: Scheme) -> ChannelDecoding:
     association, body = readings.association, channel.body
     glimpse, result = association.glimpses.get(body), readings.channels.get(channel.name)
     refusal = readings.refusals.get(channel.name)
@@ -148,14 +133,14 @@ def _channel_decoding(channel: Channel, readings: Readings, scheme: Scheme, need
         posteriors=_unknown(channel, scheme) if result is None else result.posteriors,
         searched=body in association.searched,
         exchanged=body in association.exchanged,
-        state=_state(channel, readings, scheme, needed),
+        state=_state(channel, readings, scheme),
         nats=readings.channel_nats.get(channel.name),
         refusal=None if refusal is None else str(refusal),
         also_shows=None if also == channel.name else also,
     )
 
 
-def _state(channel: Channel, readings: Readings, scheme: Scheme, needed: float) -> ChannelState:
+def _state(channel: Channel, readings: Readings, scheme: Scheme) -> ChannelState:
     if channel.body not in readings.association.glimpses:
         return "unseen"
     if channel.name not in readings.channels:

@@ -164,10 +164,12 @@ def _with_better_tracks(first: Readings, free: Sequence[Glimpse], reader: _Reade
     taken = {id(glimpse) for glimpse in glimpses.values()}
     tracks = [glimpses[body] for body in doubtful if body in glimpses]
     tracks += [glimpse for glimpse in free if id(glimpse) not in taken]
-    if not doubtful or len(first.association.glimpses) + len(tracks) < 2 or not tracks:
-        return None
     channels, start = reader.scheme.channels, reader.start
-    strengths = reader.detector.strengths(reader.codebooks[:1], channels, tracks, start.onset)[0]
+    alone = len(channels) == len(tracks) == len(glimpses) == 1
+    if not doubtful or not tracks or alone:
+        return None
+    # A second guess at names is worth no search of clocks that are far off as well.
+    strengths = reader.detector.strengths(reader.codebooks[:1], channels, tracks, start.onset, usual_rates=True)[0]
     also = shown_elsewhere(strengths, channels, tracks, math.log(1.0 / reader.threshold))
     better = exchanged(first.association, doubtful, tracks, channels, strengths)
     if better is not None:

@@ -89,11 +89,18 @@ class Detector(Protocol):
         ...
 
     def strengths(
-        self, codebooks: Sequence[Codebook], channels: Sequence[Channel], glimpses: Sequence[Glimpse], onset: Onset
+        self,
+        codebooks: Sequence[Codebook],
+        channels: Sequence[Channel],
+        glimpses: Sequence[Glimpse],
+        onset: Onset,
+        *,
+        usual_rates: bool = False,
     ) -> Floats:
         """The strength of each channel in each glimpse under each codebook, (codebooks, channels, glimpses).
 
-        NaN where a glimpse cannot be read. Quicker than `read`: to match tracks and channels.
+        NaN where a glimpse cannot be read. Quicker than `read`: to match tracks and channels. With `usual_rates` a
+        detector may leave out clocks that are far off.
         """
         ...
 

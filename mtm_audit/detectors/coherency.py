@@ -104,7 +104,13 @@ class CoherencyDetector:
         return np.asarray(shift / variance * (reading.window_scores - centre))
 
     def strengths(
-        self, codebooks: Sequence[Codebook], channels: Sequence[Channel], glimpses: Sequence[Glimpse], onset: Onset
+        self,
+        codebooks: Sequence[Codebook],
+        channels: Sequence[Channel],
+        glimpses: Sequence[Glimpse],
+        onset: Onset,
+        *,
+        usual_rates: bool = False,
     ) -> Floats:
         """Mean best coherency of each channel in each glimpse, (codebooks, channels, glimpses); NaN where unread."""
         result = np.full((len(codebooks), len(channels), len(glimpses)), np.nan)

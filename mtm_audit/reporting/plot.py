@@ -51,14 +51,17 @@ def draw_plot(recording: Recording, decoding: Decoding, path: Path) -> None:
     colour = _VERDICT_COLOURS[decoding.verdict]
     figure.suptitle(verdict_sentence(decoding), fontsize=16, fontweight="bold", color=colour)
     figure.supxlabel(chance_sentence(decoding), fontsize=9, color="#475467")
-    (tracks, scores), (decoys, margins) = figure.subplots(2, 2, height_ratios=(1.25, 1.0))
-    _draw_tracks(tracks, recording.tracks)
-    _draw_scores(scores, decoding)
-    if decoding.evidence.nats is not None:
-        _draw_bits(decoys, decoding)
+    if decoding.verdict == "absent":
+        # Scores of a recording without a message would be chance, and would look like symbols.
+        tracks, evidence = figure.subplots(1, 2)
+        _draw_tracks(tracks, recording.tracks)
+        _draw_evidence(evidence, decoding)
     else:
-        _draw_decoys(decoys, decoding)
-    _draw_margins(margins, decoding)
+        (tracks, scores), (evidence, margins) = figure.subplots(2, 2, height_ratios=(1.25, 1.0))
+        _draw_tracks(tracks, recording.tracks)
+        _draw_scores(scores, decoding)
+        _draw_evidence(evidence, decoding)
+        _draw_margins(margins, decoding)
     with replacing(path) as temporary:
         figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
 
@@ -87,10 +90,6 @@ def _draw_scores(axes: Axes, decoding: Decoding) -> None:
     names, table = _score_table(decoding)
     low, high = float(table.min()), float(table.max())
     low -= 0.1 * abs(low)
-    marked = decoding.verdict != "absent"
-    if not marked:
-        # The scale reaches well above the common score, so that scores which hardly differ look so.
-        high = max(high, 1.6 * float(np.median(table)))
     image = axes.imshow(table, aspect="auto", cmap="Blues", vmin=low, vmax=high)
     axes.figure.colorbar(image, ax=axes, shrink=0.85, label="score")
     best = np.argmax(table, axis=1)
@@ -98,11 +97,9 @@ def _draw_scores(axes: Axes, decoding: Decoding) -> None:
         for (row, symbol), score in np.ndenumerate(table):
             colour = "white" if score > (low + high) / 2.0 else "#344054"
             axes.text(symbol, row, _written(float(score)), ha="center", va="center", fontsize=9, color=colour)
-    if marked:
-        axes.plot(best, np.arange(len(best)), "s", markersize=26 if len(best) <= 6 else 10, markerfacecolor="none",
-                  markeredgecolor="#e4572e", markeredgewidth=2.0)  # fmt: skip
-    title = "What each symbol scored (best framed)" if marked else "What each symbol scored (nothing stands out)"
-    axes.set(title=title, xlabel="symbol")
+    axes.plot(best, np.arange(len(best)), "s", markersize=26 if len(best) <= 6 else 10, markerfacecolor="none",
+              markeredgecolor="#e4572e", markeredgewidth=2.0)  # fmt: skip
+    axes.set(title="What each symbol scored (best framed)", xlabel="symbol")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     _name_places(axes, names)
 
@@ -117,6 +114,13 @@ def _draw_decoys(axes: Axes, decoding: Decoding) -> None:
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     _legend_below(axes)
     _tidy(axes)
+
+
+def _draw_evidence(axes: Axes, decoding: Decoding) -> None:
+    if decoding.evidence.nats is not None:
+        _draw_bits(axes, decoding)
+    else:
+        _draw_decoys(axes, decoding)
 
 
 def _draw_bits(axes: Axes, decoding: Decoding) -> None:

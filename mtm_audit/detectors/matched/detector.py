@@ -66,7 +66,13 @@ class MatchedDetector:
         return [readings[number] if number in readings else refusals[number] for number in range(len(observations))]
 
     def strengths(
-        self, codebooks: Sequence[Codebook], channels: Sequence[Channel], glimpses: Sequence[Glimpse], onset: Onset
+        self,
+        codebooks: Sequence[Codebook],
+        channels: Sequence[Channel],
+        glimpses: Sequence[Glimpse],
+        onset: Onset,
+        *,
+        usual_rates: bool = False,
     ) -> Floats:
         """The log evidence that the search finds for each channel in each glimpse: (codebooks, channels, glimpses)."""
         result = np.full((len(codebooks), len(channels), len(glimpses)), np.nan)
@@ -76,7 +82,7 @@ class MatchedDetector:
             for length in np.unique(ticks):
                 rows = np.flatnonzero(ticks == length)
                 played = [(codebook, channels[int(row)]) for row in rows for codebook in codebooks]
-                found = search_timings(played, prepared, onset)
+                found = search_timings(played, prepared, onset, usual_rates=usual_rates)
                 for place, item in enumerate(found):
                     row, number = divmod(place, len(codebooks))
                     channel = channels[int(rows[row])]

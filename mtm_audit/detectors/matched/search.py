@@ -77,17 +77,23 @@ def search_timings(
     prepared: Prepared,
     onset: Onset,
     progress: Callable[[float], None] | None = None,
+    *,
+    usual_rates: bool = False,
 ) -> list[Found]:
     """The best timing of each channel that may be `played`: rates, and onsets as far as they are not known.
 
     The channels' codebooks share one scheme and their windows one length. Rates lie within +-20 %, and where clocks
     bound the onset near the nominal one. Under the fixed schedule the onset found is that of the first window in step
-    with the message.
+    with the message. With `usual_rates` clocks that are off by more than 3 % are left out.
     """
     (codebook, channel), motion = played[0], prepared.motion
     scheme = codebook.scheme
     ticks = scheme.window_ticks(channel)
     rates_hz = candidate_rates(scheme, channel, onset)
+    if usual_rates and len(rates_hz) > 1:
+        near = np.abs(rates_hz / scheme.rate_hz - 1.0) <= _USUAL_RATES
+        # A spacing is needed however far apart the rates are.
+        rates_hz = rates_hz[near] if near.sum() > 1 else rates_hz[len(rates_hz) // 2 - 1 : len(rates_hz) // 2 + 2]
     lead = lead_cells(scheme, channel, motion, onset)
     windows = waveform_sets(scheme, channel, motion, onset)
     tones = [[stacked_tones(book, one, number) for number in range(windows)] for book, one in played]
@@ -144,7 +150,7 @@ def _onsets_and_rates(
         evidence > _PLAIN_NATS and abs(winner.coarse - middle) * spacing <= 0.5 * _USUAL_RATES
         for evidence, winner in best
     )
-    if not plain:
+    if not plain and len(usual) < rates:
         others = [coarse for coarse in range(rates) if coarse not in usual]
         pairs = zip(best, _best_of_rates(place, others, tones, motion, report), strict=True)
         best = [max(pair, key=_evidence) for pair in pairs]
