@@ -45,7 +45,7 @@ def swept(low_s, high_s, rates, step_s=0.019):
 RATES = 1.0 + np.linspace(-0.012, 0.012, 25)
 
 
-def test_a_known_onset_has_a_prior_of_sum_one_over_the_whole_grid():
+def test_a_known_onset_has_a_prior_of_sum_one_over_the_grid():
     grid = whole_grid(swept(1.2, 1.25, 1.0 + np.linspace(-0.1, 0.1, 401)), 1.2, backwards=False)
     total = sum(grid.values())
     assert total <= 1.0 + 1e-9
@@ -80,7 +80,7 @@ def test_a_range_of_onsets_has_a_prior_of_sum_one():
     order=st.integers(1, 8),
     known=st.sampled_from(["known", "range", "open"]),
 )
-def test_a_neighbourhood_is_part_of_the_grid_and_holds_its_timing(onset_s, rate, ticks, order, known):
+def test_a_neighbourhood_holds_its_timing_and_part_of_the_grid(onset_s, rate, ticks, order, known):
     timing = Timing(onset_s, RATE_HZ * rate)
     span = span_of(timing, seconds=30.0, ticks=ticks, order=order)
     onset = {"known": onset_s, "range": OnsetRange(onset_s - 2.0, onset_s + 2.0), "open": None}[known]

@@ -153,7 +153,7 @@ VECTORS = st.integers(2, 40).flatmap(
 
 
 @given(VECTORS)
-def test_the_sphere_s_mean_lies_between_jensen_and_the_largest_value(weights):
+def test_the_mean_lies_between_jensen_s_bound_and_the_largest(weights):
     linear, quadratic = weights
     found = float(log_mean_sphere(linear, quadratic))
     slack = 1e-9 * (1.0 + np.abs(linear).max() + quadratic.max())
