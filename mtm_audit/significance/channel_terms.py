@@ -206,6 +206,7 @@ def channel_terms(
             window_ticks=ticks,
             step_s=reading.prepared.motion.step_s,
             origin_s=reading.prepared.motion.start_s,
+            lasts_s=len(reading.prepared.motion.seen) * reading.prepared.motion.step_s,
             nominal_hz=scheme.rate_hz,
             order=channel.symbols if shared else 1,
         ),

@@ -121,8 +121,6 @@ def _anchor(channels: Sequence[ChannelTerms], channel: ChannelTerms) -> Timing:
     What that channel found by itself: a timing that `channel` had a say in would depend on its candidates.
     """
     strongest = max(channels, key=lambda other: other.strength)
-    if strongest is channel:
-        return channel.timing
     return at_phase_of(channel.timing, strongest.alone, channel.span.window_ticks)
 
 

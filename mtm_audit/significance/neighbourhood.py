@@ -13,6 +13,7 @@ from mtm_audit.model.track import Floats
 _EARLIEST_S, _LATEST_S = -0.04, 0.42
 _SHIFTS = np.arange(-4, 5)
 _RATE_STEPS = np.arange(-2, 3)
+_NOMINAL_STEPS = np.arange(-1, 2)
 # Clocks that are off by more are possible but rare: the scale of a Cauchy prior over relative rates.
 _USUAL_RATE_ERROR = 0.003
 
@@ -21,13 +22,15 @@ _USUAL_RATE_ERROR = 0.003
 class Span:
     """Which windows of a channel a recording shows: their `numbers` (windows,), lengths in ticks and cells in seconds.
 
-    `order` is how many rotations of the message the schedule leaves open, 1 where windows say their number.
+    The recording begins at `origin_s` and lasts `lasts_s`, the same for all bodies of a film. `order` is how many
+    rotations of the message the schedule leaves open, 1 where windows say their number.
     """
 
     numbers: NDArray[np.int64]
     window_ticks: int
     step_s: float
     origin_s: float
+    lasts_s: float
     nominal_hz: float
     order: int
 
@@ -56,11 +59,10 @@ def neighbourhood(span: Span, timing: Timing, onset: Onset) -> Neighbourhood:
     half_s = 0.5 * span.step_s
     known_s = float(onset) if isinstance(onset, int | float) else None
     pivot = 0 if known_s is not None else int(span.numbers[len(span.numbers) // 2])
-    lasting_s = span.window_ticks / span.nominal_hz
-    reach = max(1, int(np.abs(span.numbers - pivot).max()) + 1)
-    spacing = half_s / (reach * lasting_s)
+    spacing = half_s / (span.lasts_s if known_s is not None else 0.5 * span.lasts_s)
     nearest = round((timing.rate_hz / span.nominal_hz - 1.0) / spacing)
-    relative = (nearest + _RATE_STEPS) * spacing
+    # The nominal rate is likelier than all others together, whatever the search preferred.
+    relative = np.unique(np.concatenate([nearest + _RATE_STEPS, _NOMINAL_STEPS])) * spacing
     if known_s is not None:
         shifts_s = np.arange(math.floor(_EARLIEST_S / half_s), math.ceil(_LATEST_S / half_s) + 1) * half_s
         pivot_s, count = known_s, len(shifts_s)

@@ -21,7 +21,8 @@ def span_of(timing, seconds=21.0, ticks=150, order=1, *, backwards=True, begin_s
     first = math.ceil((begin_s - timing.onset_s) / length_s - 0.7)
     last = math.floor((begin_s + seconds - timing.onset_s) / length_s - 0.3)
     numbers = np.arange(first if backwards else max(0, first), last + 1)
-    return Span(numbers, ticks, STEP_S, begin_s, RATE_HZ, order)
+    lasts_s = (int(numbers.max()) + 1) * ticks / RATE_HZ
+    return Span(numbers, ticks, STEP_S, begin_s, lasts_s, RATE_HZ, order)
 
 
 def whole_grid(timings, onset, **recording):
