@@ -80,7 +80,9 @@ def _of_the_uncertain(recording: Recording, decoding: Decoding) -> list[str]:
             "that it is in sight, and that its track is the right one"
         )
     if doubtful:
-        sentences.append(f"uncertain: {_places(doubtful)}; {_longer(recording, decoding, doubtful)}")
+        bodies = sorted({body for place in doubtful for body in _bodies(decoding, place)})
+        what = f"{_places(doubtful)}, which {_listed(bodies)} sends"
+        sentences.append(f"uncertain: {what}; {_longer(recording, decoding, doubtful)}")
     return sentences
 
 

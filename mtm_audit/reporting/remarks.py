@@ -56,7 +56,8 @@ def _of_exchanged_tracks(decoding: Decoding) -> list[str]:
             found.append(f"{body} and {other} are exchanged: each one's motion is in the track named after the other")
             told |= {body, other}
         elif body not in told:
-            found.append(f"{body} is the track {track}, though names say otherwise: its motion is there")
+            says = "it was assigned another" if body in decoding.settings.assignment else "names say otherwise"
+            found.append(f"{body} is the track {track}, though {says}: its motion is there")
     return found
 
 

@@ -70,7 +70,8 @@ def test_tracks_assigned_the_wrong_way_are_read_and_it_is_told():
     decoding = decoded(run, run.tracks, assignment={"robot0": "robot2", "robot2": "robot0"})
     assert (decoding.verdict, decoding.symbols) == ("decoded", run.symbols)
     warnings = told(run.tracks, decoding)
-    assert all(any(body in warning for warning in warnings) for body in ("robot0", "robot2"))
+    for body in ("robot0", "robot2"):
+        assert f"{body} is the track {body}, though it was assigned another: its motion is there" in warnings
     # Each is in the track of its own name; what said otherwise was the assignment.
     assert not any("names say otherwise" in warning for warning in warnings)
 

@@ -145,7 +145,7 @@ def test_the_advised_length_grows_with_the_doubt(posterior, words):
     posteriors[1, 2] = posterior
     doubtful = replace(decoding, verdict="inconclusive", message=None, posteriors=posteriors)
     (sentence,) = advice(recording, doubtful)
-    assert sentence.startswith("uncertain: symbol 1; ")
+    assert sentence.startswith("uncertain: symbol 1, which robot1 sends; ")
     assert words in sentence
 
 
