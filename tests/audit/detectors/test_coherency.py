@@ -151,3 +151,15 @@ def test_a_reading_holds_where_its_windows_began(glimpse):
 def test_without_decoys_it_says_what_it_needs(glimpse):
     with pytest.raises(MtmError, match="decoys and got none; give one decoy at least"):
         CoherencyDetector().read(KEY.codebook(), [], [Observation(CHANNEL, glimpse)], 1.0)
+
+
+def test_strengths_of_pairs_are_those_of_reading_them(glimpse):
+    other = key_of(scheme_of(symbols=(2, 2), ticks=600))
+    short = glimpse_of_track(robot_track(KEY, "robot0", (0, 0), 2.0))
+    codebooks = [other.codebook(), *decoy_codebooks(other, 2)]
+    table = CoherencyDetector().strengths(codebooks, other.scheme.channels, [glimpse, short], 1.0)
+    assert table.shape == (3, 2, 2)
+    assert np.all(np.isnan(table[:, :, 1]))
+    for row, channel in enumerate(other.scheme.channels):
+        read = CoherencyDetector().read_channel(codebooks, channel, glimpse, 1.0)
+        assert table[:, row, 0].tolist() == [reading.strength for reading in read]
