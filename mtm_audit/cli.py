@@ -37,7 +37,9 @@ def _version(asked: bool) -> None:
     if asked:
         from importlib.metadata import version
 
-        print(f"mtm-audit {version('mtm')}")
+        from mtm_onboard.protocol.installing import DISTRIBUTION
+
+        print(f"mtm-audit {version(DISTRIBUTION)}")
         raise typer.Exit
 
 

@@ -41,6 +41,7 @@ def test_a_world_without_its_simulator_says_what_to_install(monkeypatch, capsys,
     assert leaving.value.code == 1
     (sentence,) = capsys.readouterr().err.splitlines()
     assert re.search(
-        rf"world {world} needs .*{package}.* is missing; install it with: pip install 'mtm\[worlds\]'", sentence
+        rf"world {world} needs .*{package}.* is missing; install it with: pip install 'messages-.*\[worlds\]'",
+        sentence,
     )
     assert not (tmp_path / "out").exists()
