@@ -37,9 +37,7 @@ def _version(asked: bool) -> None:
     if asked:
         from importlib.metadata import version
 
-        from mtm_onboard.protocol.installing import DISTRIBUTION
-
-        print(f"mtm-audit {version(DISTRIBUTION)}")
+        print(f"mtm-audit {version('messages-through-motion')}")
         raise typer.Exit
 
 
