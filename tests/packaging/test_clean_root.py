@@ -48,6 +48,7 @@ pytestmark = [
     pytest.mark.skipif(os.environ.get("MTM_CLEAN_ROOT") != "1", reason="only when asked for; run make deb-test"),
     pytest.mark.skipif(shutil.which("debootstrap") is None, reason="debootstrap is not here"),
     pytest.mark.realtime,
+    pytest.mark.long,
 ]
 
 

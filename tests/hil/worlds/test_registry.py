@@ -13,7 +13,10 @@ def test_every_world_has_its_signal():
     assert set(NAMES) == set(SIGNALS)
 
 
-@pytest.mark.parametrize("name", ["lunar-lander", "reacher", "discovery", "football"])
+@pytest.mark.parametrize(
+    "name",
+    ["lunar-lander", "reacher", *(pytest.param(name, marks=pytest.mark.long) for name in ("discovery", "football"))],
+)
 def test_a_world_s_axes_are_those_of_its_channels(name):
     if name in ("discovery", "football"):
         pytest.importorskip("vmas")
