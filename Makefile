@@ -5,6 +5,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 OLDEST := build/oldest
 UV := build/uv/bin/uv
+# Further arguments of every pytest.
+PYTEST :=
 # The build without CUDA where the index offers it under this number.
 TORCH := torch==2.13.0
 
