@@ -44,6 +44,7 @@ def _every_command() -> None:
 @app.command()
 def record(
     out: Annotated[Path, typer.Option(help="The folder to make; it must not exist.")],
+    *,
     message: Annotated[int | None, typer.Option(metavar="N", help="The message as a number.")] = None,
     no_message: Annotated[bool, typer.Option("--no-message", help="Move without a message.")] = False,
     seconds: Annotated[float, typer.Option(help="Length of the recording.")] = 26.0,
@@ -64,12 +65,25 @@ def record(
         from hil.commands.record import record as run
 
         film = None if no_video else camera.value
-        run(RecordOptions(out, seconds, message, key, wire.value, seed, film, realtime), console)
+        run(
+            RecordOptions(
+                out=out,
+                seconds=seconds,
+                message=message,
+                key=key,
+                wire=wire.value,
+                seed=seed,
+                camera=film,
+                realtime=realtime,
+            ),
+            console,
+        )
 
 
 @app.command()
 def film(
     world: Annotated[str, typer.Argument(metavar="WORLD", help="discovery, lunar-lander, reacher or football.")],
+    *,
     out: Annotated[Path, typer.Option(help="The folder to make; it must not exist.")],
     message: Annotated[int | None, typer.Option(metavar="N", help="The message as a number.")] = None,
     no_message: Annotated[bool, typer.Option("--no-message", help="Move without a message.")] = False,
@@ -87,7 +101,12 @@ def film(
         from hil.commands.film import FilmOptions
         from hil.commands.film import film as run
 
-        run(FilmOptions(world, out, seconds, message, key, seed, renderer.value), console)
+        run(
+            FilmOptions(
+                world=world, out=out, seconds=seconds, message=message, key=key, seed=seed, renderer=renderer.value
+            ),
+            console,
+        )
 
 
 @app.command()
@@ -142,7 +161,7 @@ def false_alarms(
     with reported_console() as console:
         from hil.commands.false_alarms import false_alarms as run
 
-        run(decodes, detector, seed, workers, out, cells, console)
+        run(decodes, detector, seed, workers, out=out, cells=cells, console=console)
 
 
 @app.command()
@@ -209,6 +228,7 @@ def sweep(
         str,
         typer.Argument(metavar="WORLD", help="The world: robomaster, discovery, lunar-lander, reacher or football."),
     ],
+    *,
     out: Annotated[Path, typer.Option(help="The accuracy table to write, for mtm-audit plan.")],
     rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each M and window.")] = 50,
     alphabet: Annotated[
@@ -233,17 +253,17 @@ def sweep(
         from hil.commands.sweep import sweep as run
 
         options = SweepOptions(
-            world,
-            rollouts,
-            tuple(alphabet or ()),
-            tuple(window or ()),
-            windows,
-            scheme,
-            detector,
-            first_seed,
-            workers,
-            out,
-            cells,
+            world=world,
+            rollouts=rollouts,
+            alphabet_sizes=tuple(alphabet or ()),
+            window_ticks=tuple(window or ()),
+            windows=windows,
+            scheme=scheme,
+            detector=detector,
+            first_seed=first_seed,
+            workers=workers,
+            out=out,
+            cells=cells,
         )
         run(options, console)
 

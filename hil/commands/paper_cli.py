@@ -37,6 +37,7 @@ _Cells = Annotated[Path, typer.Option(help=CELLS_HELP)]
 
 def _paper_worlds(
     context: typer.Context,
+    *,
     rollouts: _Rollouts = 50,
     quick: _Quick = False,
     seed: _Seed = 10_000,
@@ -49,7 +50,17 @@ def _paper_worlds(
         from hil.commands.paper import WorldOptions, paper_table
 
         paper_table(
-            str(context.info_name), WorldOptions(rollouts, quick, seed, renderer.value, workers, out, cells), console
+            str(context.info_name),
+            WorldOptions(
+                rollouts=rollouts,
+                quick=quick,
+                first_seed=seed,
+                renderer=renderer.value,
+                workers=workers,
+                out=out,
+                cells=cells,
+            ),
+            console,
         )
 
 

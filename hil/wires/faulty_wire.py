@@ -20,7 +20,7 @@ from mtm_onboard.protocol import MtmError
 _MOST_BYTES_CHANGED = 3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class WireFaults:
     """Chances of one unit to be lost, sent twice, changed in up to three bytes, or overtaken by the next; how long
     units take (least and most, in order); and how long in each `block_every_s` the wire takes nothing.
