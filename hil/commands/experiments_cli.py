@@ -112,6 +112,7 @@ def sweep(
         str,
         typer.Argument(metavar="WORLD", help="The world: robomaster, discovery, lunar-lander, reacher or football."),
     ],
+    *,
     out: Annotated[Path, typer.Option(help="The accuracy table to write, for mtm-audit plan.")],
     rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each M and window.")] = 50,
     alphabet: Annotated[

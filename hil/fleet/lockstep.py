@@ -51,7 +51,7 @@ class _Link:
     stop_releases_motors: bool = True
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Robot:
     name: str
     plant: MecanumPlant
@@ -71,9 +71,16 @@ class _Robot:
         guard, controller = self.guard, self.controller
         is_stopped = controller.demand == STOP and not (self.link.stop_releases_motors and controller.work_mode)
         return RobotReport(
-            self.name, stats.sent, stats.missed, guard.clamped, guard.stale, guard.refused, self.link.faults(),
-            controller.deadman_stops, is_stopped,
-        )  # fmt: skip
+            name=self.name,
+            sent=stats.sent,
+            missed=stats.missed,
+            clamped=guard.clamped,
+            stale=guard.stale,
+            refused=guard.refused,
+            faults=self.link.faults(),
+            deadman_stops=controller.deadman_stops,
+            is_stopped=is_stopped,
+        )
 
 
 def run_lockstep(settings: RunSettings) -> RunResult:
@@ -155,7 +162,16 @@ def _robot(
     guard = Guard(LIMITS, Staleness(), noise_sigma=channel.sigma, period_s=period_s)
     modulator = None if message is None else _modulator(settings, channel, message)
     runtime = Runtime(modulator, guard, source, link.transport)
-    return _Robot(channel.body, plant, controller, link, settings.task(route, slip_seed), source, guard, runtime)
+    return _Robot(
+        name=channel.body,
+        plant=plant,
+        controller=controller,
+        link=link,
+        task=settings.task(route, slip_seed),
+        source=source,
+        guard=guard,
+        runtime=runtime,
+    )
 
 
 def _modulator(settings: RunSettings, channel: Channel, message: Message) -> NoiseAdder:

@@ -93,9 +93,17 @@ class OnboardProcess:
         median_s, late_s = np.quantile(journal.lateness_s, (0.5, 0.99))
         is_stopped = controller.demand == STOP and not (self._wire.stop_releases_motors and controller.work_mode)
         return RobotReport(
-            self.name, sent, missed, clamped, stale, refused, self._wire.faults(),
-            controller.deadman_stops, is_stopped, (float(median_s), float(late_s)),
-        )  # fmt: skip
+            name=self.name,
+            sent=sent,
+            missed=missed,
+            clamped=clamped,
+            stale=stale,
+            refused=refused,
+            faults=self._wire.faults(),
+            deadman_stops=controller.deadman_stops,
+            is_stopped=is_stopped,
+            late_s=(float(median_s), float(late_s)),
+        )
 
 
 def check_ticks(name: str, journal: JournalRecord) -> tuple[int, int]:

@@ -21,7 +21,7 @@ _VELOCITY_XY, _VELOCITY_XYZ = 0b011 << 3, 0b111 << 3
 _FORCE, _YAW, _YAW_RATE = 1 << 9, 1 << 10, 1 << 11
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Firmware:
     """One autopilot.
 

@@ -20,7 +20,7 @@ from mtm_onboard.protocol import MtmError
 _MAX_BYTES_CHANGED = 3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class WireFaults:
     """Faults of one direction.
 

@@ -28,7 +28,7 @@ Table = dict[str, Any]
 _PATIENCE_S = 2.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Session:
     """The parts of a run that can be asked or told something.
 

@@ -126,9 +126,18 @@ def run_session(
         runtime = Runtime(modulator, guard, source, transport, journal)
         if socket is not None:
             session = Session(
-                config.robot.name, key, modulator, guard, source, transport, stats, journal,
-                lambda: math.floor((clock.now() - start_s) * rate_hz), start_unix_s, first_slot,
-            )  # fmt: skip
+                robot=config.robot.name,
+                key=key,
+                modulator=modulator,
+                guard=guard,
+                source=source,
+                transport=transport,
+                stats=stats,
+                journal=journal,
+                tick=lambda: math.floor((clock.now() - start_s) * rate_hz),
+                start_unix_s=start_unix_s,
+                first_slot=first_slot,
+            )
             socket.serve(Control(session).answer)
 
         # Closed first of all: whoever ends takes as long as it takes, and no watchdog is fed any more.

@@ -12,6 +12,7 @@ from contextlib import suppress
 
 from mtm_onboard.links.base import LinkBusyError
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.installing import install_command
 
 _CONNECT_WITHIN_S = 3.0
 _DELIVER_WITHIN_S = 0.2
@@ -109,7 +110,9 @@ def serial_link(port: str, baudrate: int) -> ByteLink:
     try:
         import serial
     except ImportError:
-        raise MtmError("pyserial is not installed; install mtm[serial] to reach a robot over a serial line.") from None
+        raise MtmError(
+            f"a serial line needs pyserial, which is not installed; install it with: {install_command('serial')}"
+        ) from None
     try:
         # Exclusive: another program's commands on the same line would mix with ours.
         line = serial.Serial(port, baudrate, timeout=0, exclusive=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 from mtm_onboard.links.base import LinkBusyError
 from mtm_onboard.links.duml import Message, Parser, encode, segment
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.installing import install_command
 
 if TYPE_CHECKING:
     import can
@@ -43,7 +44,9 @@ class CanStream:
         try:
             import can
         except ImportError:
-            raise MtmError("python-can is not installed; install mtm[can] to reach a robot over CAN.") from None
+            raise MtmError(
+                f"CAN needs python-can, which is not installed; install it with: {install_command('can')}"
+            ) from None
         self.parser = Parser()
         self._bus = bus
         self._send_id = send_id

@@ -38,6 +38,7 @@ from mtm_onboard.links.robomaster_telemetry import (
 )
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.installing import install_command
 
 SUBSCRIPTION: Final = Subscription(stream=0, topics=(VELOCITY, ATTITUDE, POSITION), rate_hz=50)
 
@@ -166,7 +167,9 @@ class RoboMasterCan(Transport):
         try:
             import can
         except ImportError:
-            raise MtmError("python-can is not installed; install mtm[can] to reach a robot over CAN.") from None
+            raise MtmError(
+                f"CAN needs python-can, which is not installed; install it with: {install_command('can')}"
+            ) from None
         try:
             bus = can.Bus(**{"bitrate": BITRATE, **self._bus_options})
         except (can.CanError, OSError, ValueError, TypeError) as error:

@@ -33,7 +33,7 @@ COLUMNS = (
 _NUMBER_DIGITS = 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class JournalHeader:
     """What the rows belong to. `symbols` is the whole message, None when only base commands were sent.
 
@@ -60,7 +60,7 @@ class Event:
     text: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class JournalRecord:
     """A journal read back: n rows. `base` and `sent` are (n, 3): vx, vy in m/s and wz in rad/s.
 
@@ -134,9 +134,16 @@ def read_journal(path: Path) -> JournalRecord:
         raise MtmError(f"{path} does not begin like a journal; name a file that mtm-onboard run wrote")
     columns = np.concatenate(tables)
     return JournalRecord(
-        header, columns[:, 0].astype(np.int64), columns[:, 1], columns[:, 2:5], columns[:, 5:8], columns[:, 8],
-        columns[:, 9].astype(np.int64), damaged, tuple(events),
-    )  # fmt: skip
+        header=header,
+        ticks=columns[:, 0].astype(np.int64),
+        times_s=columns[:, 1],
+        base=columns[:, 2:5],
+        sent=columns[:, 5:8],
+        lateness_s=columns[:, 8],
+        flags=columns[:, 9].astype(np.int64),
+        damaged=damaged,
+        events=tuple(events),
+    )
 
 
 @dataclass(frozen=True)

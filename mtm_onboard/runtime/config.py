@@ -93,7 +93,7 @@ class RealtimeSettings:
             raise MtmError(f"cpu is {self.cpu}; choose the number of a processor, from 0 on, or leave it out")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RobotConfig:
     """All of it. `transport_options` are the fields of [transport] beside its kind.
 

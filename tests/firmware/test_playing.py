@@ -25,7 +25,18 @@ WIDE = in_q20(WIDE_LIMITS)
 
 def codebook(schedule="fixed", ticks=60, rate_hz=50.0):
     channels = (Channel("robot", "robot", ("vx", "vy"), 2, 0.1),)
-    return Codebook(SECRET, Scheme("test", rate_hz, (0.5, 5.0), 4, ticks, channels, schedule=schedule))
+    return Codebook(
+        SECRET,
+        Scheme(
+            name="test",
+            rate_hz=rate_hz,
+            band_hz=(0.5, 5.0),
+            alphabet_size=4,
+            message_ticks=ticks,
+            channels=channels,
+            schedule=schedule,
+        ),
+    )
 
 
 def message_image(schedule="fixed", *, limits=WIDE_LIMITS, ticks=60, **options):
@@ -65,10 +76,16 @@ def test_the_reference_waveforms_are_played_to_the_stated_bound(vector):
     band_hz = (float(vector["band_hz"][0]), float(vector["band_hz"][1]))
     axes = ("vx", "vy", "wz")[: axis + 1]
     scheme = Scheme(
-        "reference", float(vector["rate_hz"]), band_hz, 512, vector["window_ticks"],
-        (Channel("robot", "robot", axes, 1, sigma),), power=vector["power"],
-        schedule="rolling" if rolling else "fixed", epoch=vector["epoch"],
-    )  # fmt: skip
+        name="reference",
+        rate_hz=float(vector["rate_hz"]),
+        band_hz=band_hz,
+        alphabet_size=512,
+        message_ticks=vector["window_ticks"],
+        channels=(Channel("robot", "robot", axes, 1, sigma),),
+        power=vector["power"],
+        schedule="rolling" if rolling else "fixed",
+        epoch=vector["epoch"],
+    )
     book = Codebook(bytes.fromhex(vector["key_hex"]), scheme)
     image = channel_image(book, "robot", (vector["symbol"],), limits=WIDE_LIMITS, first_message=window)
     player = ShimPlayer(image.rate_mhz, WIDE, 9_999, 10_000)

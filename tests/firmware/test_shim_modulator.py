@@ -14,7 +14,18 @@ BASE = BodyVelocity(0.3, -0.2, 0.1)
 
 def codebook(schedule="fixed", axes=("vy", "vx")):
     channel = Channel("robot", "robot", axes, 3, 0.1)
-    return Codebook(SECRET, Scheme("test", 50.0, (0.5, 5.0), 4, 150, (channel,), schedule=schedule))
+    return Codebook(
+        SECRET,
+        Scheme(
+            name="test",
+            rate_hz=50.0,
+            band_hz=(0.5, 5.0),
+            alphabet_size=4,
+            message_ticks=150,
+            channels=(channel,),
+            schedule=schedule,
+        ),
+    )
 
 
 def both(schedule, **options):

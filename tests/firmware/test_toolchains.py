@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+# CI installs the compilers and the emulator for `make test-all` alone.
+pytestmark = pytest.mark.long
+
 SHIM = Path(__file__).resolve().parents[2] / "firmware_shim"
 
 

@@ -25,7 +25,7 @@ from tests.mutation.mutate import Mutant, mutants_of
 
 ROOT = Path(__file__).parents[2]
 MODULE = "mtm_onboard.runtime.guard"
-SOURCE = ROOT / "mtm_onboard" / "guard.py"
+SOURCE = ROOT.joinpath(*MODULE.split(".")).with_suffix(".py")
 EXPLAINED = ROOT / "docs" / "mutants.md"
 # The quickest first; the others run with what is left.
 TESTS = (

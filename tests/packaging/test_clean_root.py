@@ -48,6 +48,7 @@ pytestmark = [
     pytest.mark.skipif(os.environ.get("MTM_CLEAN_ROOT") != "1", reason="only when asked for; run make deb-test"),
     pytest.mark.skipif(shutil.which("debootstrap") is None, reason="debootstrap is not here"),
     pytest.mark.realtime,
+    pytest.mark.long,
 ]
 
 
@@ -69,10 +70,11 @@ def debian(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def robot(debian):
+def robot(debian, tmp_path_factory):
     """That Debian with the package and one robot's configuration and key."""
-    subprocess.run([sys.executable, ROOT / "packaging/build_deb.py"], check=True, stdout=subprocess.DEVNULL)
-    (built,) = (ROOT / "dist").glob("mtm-onboard_*_all.deb")
+    folder = tmp_path_factory.mktemp("deb")
+    subprocess.run([sys.executable, ROOT / "packaging/build_deb.py", folder], check=True, stdout=subprocess.DEVNULL)
+    (built,) = folder.glob("mtm-onboard_*_all.deb")
     shutil.copy(built, debian / "tmp/mtm-onboard.deb")
     as_root(debian, "dpkg", "--install", "/tmp/mtm-onboard.deb")
     (debian / HOME / "robot0.toml").write_text(CONFIG)

@@ -47,16 +47,21 @@ SYMBOLS = (2, 0, 3)
 
 # Three windows of two seconds; whole messages to the day.
 _SCHEME = Scheme(
-    "endurance", 50.0, (0.5, 5.0), 4, 300, (Channel("robot0", "robot0", ("vx", "vy"), len(SYMBOLS), 0.1),),
+    name="endurance",
+    rate_hz=50.0,
+    band_hz=(0.5, 5.0),
+    alphabet_size=4,
+    message_ticks=300,
+    channels=(Channel("robot0", "robot0", ("vx", "vy"), len(SYMBOLS), 0.1),),
     schedule="rolling",
-)  # fmt: skip
+)
 _KEY = Key("endurance", b"simulated, so this is no secret.", _SCHEME)
 _MIDNIGHT_UNIX_S = 20_000.0 * EPOCH_S
 _DECOYS = 20
 _FILM_SAMPLES = round(FILM_S / SAMPLE_PERIOD_S)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Checkpoint:
     """The state at `elapsed_s` of simulated time, and the message as decoded from the minute before.
 
@@ -129,7 +134,15 @@ class _Robot:
         self._task = TASKS["orbit"](Route((0.0, 0.0), ()), seed)
         rate_hz = _SCHEME.rate_hz
         header = JournalHeader(
-            _SCHEME.fingerprint, _KEY.id, "robot0", "robot0", SYMBOLS, True, rate_hz, 0.0, begin_unix_s
+            fingerprint=_SCHEME.fingerprint,
+            key_id=_KEY.id,
+            robot="robot0",
+            channel="robot0",
+            symbols=SYMBOLS,
+            repeat=True,
+            rate_hz=rate_hz,
+            start_s=0.0,
+            start_unix_s=begin_unix_s,
         )
         self._journal = Journal(folder / "robot0.csv", header, threaded=False, max_bytes=journal_bytes)
         self._guard = Guard(LIMITS, Staleness(), noise_sigma=_SCHEME.channels[0].sigma, period_s=1.0 / rate_hz)

@@ -94,7 +94,7 @@ class _End:
 
 
 def run_fault(
-    wire_name: str, fault: Fault, loss: str, key: Key, symbols: tuple[int, ...], seed: int, folder: Path
+    wire_name: str, fault: Fault, loss: str, key: Key, symbols: tuple[int, ...], *, seed: int, folder: Path
 ) -> FaultRun:
     """The record of one run; `loss` is "", "cut" or "swallowed", and the journal is written into `folder`."""
     clock = SimulatedClock()
@@ -162,7 +162,15 @@ class _Ticks:
 def _header(key: Key, symbols: tuple[int, ...]) -> JournalHeader:
     scheme = key.scheme
     return JournalHeader(
-        scheme.fingerprint, key.id, "robot0", scheme.channels[0].name, symbols, True, scheme.rate_hz, START_S, None
+        fingerprint=scheme.fingerprint,
+        key_id=key.id,
+        robot="robot0",
+        channel=scheme.channels[0].name,
+        symbols=symbols,
+        repeat=True,
+        rate_hz=scheme.rate_hz,
+        start_s=START_S,
+        start_unix_s=None,
     )
 
 

@@ -20,7 +20,15 @@ JOB = ("--bits", "10", "--rate", "50", "--alphabet", "4", "--measured-only")
 def folder(tmp_path):
     write_table(tmp_path / "lander.csv", LANDER)
     channels = tuple(Channel(name, "lander", (name,), 1, 0.5) for name in ("x", "y"))
-    scheme = Scheme("lander", 50.0, (0.5, 5.0), 8, 300, channels, power="ensemble")
+    scheme = Scheme(
+        name="lander",
+        rate_hz=50.0,
+        band_hz=(0.5, 5.0),
+        alphabet_size=8,
+        message_ticks=300,
+        channels=channels,
+        power="ensemble",
+    )
     save_key(Key("fake", b"not a real secret, only for test", scheme), tmp_path / "lander.key")
     return tmp_path
 

@@ -9,7 +9,15 @@ from mtm_onboard.protocol import Channel, MtmError, Scheme
 
 def scheme(*counts, ticks=300, combine="split"):
     channels = tuple(Channel(name, name, ("vx",), count, 0.1) for name, count in zip("xyz", counts, strict=False))
-    return Scheme("test", 50.0, (0.5, 5.0), 4, ticks, channels, combine=combine)
+    return Scheme(
+        name="test",
+        rate_hz=50.0,
+        band_hz=(0.5, 5.0),
+        alphabet_size=4,
+        message_ticks=ticks,
+        channels=channels,
+        combine=combine,
+    )
 
 
 def table(*rights, name="x", step=100):

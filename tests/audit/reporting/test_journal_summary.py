@@ -19,7 +19,17 @@ from tests.onboard.schemes import FAKE_SECRET, small_codebook
 
 BASE = BodyVelocity(0.3, -0.1, 0.5)
 MESSAGE = Modulator(small_codebook(), "a", (2,))
-HEADER = JournalHeader("0123456789abcdef", "fake-key", "robot0", "a", (2, 0, 1, 3), True, 50.0, 0.0, 1.7e9)
+HEADER = JournalHeader(
+    fingerprint="0123456789abcdef",
+    key_id="fake-key",
+    robot="robot0",
+    channel="a",
+    symbols=(2, 0, 1, 3),
+    repeat=True,
+    rate_hz=50.0,
+    start_s=0.0,
+    start_unix_s=1.7e9,
+)
 
 
 @pytest.fixture
@@ -80,7 +90,17 @@ def test_in_a_missing_tick_the_noise_is_held_and_not_valid(tmp_path):
 
 
 def test_in_simulated_time_the_noise_counts_from_the_message_s_start(tmp_path):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", None, True, 50.0, 100.0, None)
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=None,
+        repeat=True,
+        rate_hz=50.0,
+        start_s=100.0,
+        start_unix_s=None,
+    )
     with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
         journal.append(0, 100.0, BASE, BASE, CLAMPED)
     assert injected_noise(read_journal(journal.path)).edges_s == pytest.approx([0.0, 0.02])

@@ -14,7 +14,14 @@ from tests.audit.moving_robot import key_of
 from tests.audit.tracking.test_arms import arm
 
 TICKS, SYMBOL = 300, 2
-SCHEME = Scheme("test", 50.0, (0.5, 5.0), 4, TICKS, (Channel("inner", "arm", ("inner",), 1, 1.0),))
+SCHEME = Scheme(
+    name="test",
+    rate_hz=50.0,
+    band_hz=(0.5, 5.0),
+    alphabet_size=4,
+    message_ticks=TICKS,
+    channels=(Channel("inner", "arm", ("inner",), 1, 1.0),),
+)
 KEY = key_of(SCHEME)
 TRACKERS = (
     "aruco", "colour:red", "colour:hsv(0-10,80-255,60-255)", "brightness:8,8,120,88", "centroid:red", "arms",

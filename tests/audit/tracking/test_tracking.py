@@ -20,7 +20,15 @@ from mtm_onboard.protocol import MtmError
 
 SECONDS = 1.2
 PHONE = Camera(
-    Optics((2.2, -2.4, 2.4), (0.0, 0.0, 0.2), 700, 960, 540, roll_rad=0.15, radial=(-0.12, 0.02)),
+    optics=Optics(
+        position_m=(2.2, -2.4, 2.4),
+        target_m=(0.0, 0.0, 0.2),
+        focal_px=700,
+        width_px=960,
+        height_px=540,
+        roll_rad=0.15,
+        radial=(-0.12, 0.02),
+    ),
     rate_hz=30.0,
     jitter_s=0.004,
     drop_probability=0.1,
@@ -98,7 +106,7 @@ def test_an_occluded_robot_is_missing_and_comes_back(tmp_path):
 @pytest.mark.parametrize("name", ["aruco", "aruco:mirrored"])
 def test_a_mirrored_video_is_read_by_flipping_it_back(tmp_path, name):
     optics = replace(overhead(), mirrored=True)
-    (track, _) = load_tracks(filmed(Camera(optics), tmp_path / "film.mp4"), name)
+    (track, _) = load_tracks(filmed(Camera(optics=optics), tmp_path / "film.mp4"), name)
     assert rms(errors_px(track, wandering()[0], overhead())) < 0.15
 
 

@@ -95,10 +95,25 @@ def test_the_fleet_s_scheme_is_that_of_the_key_generator_s_preset(tmp_path, caps
         ({"symbols": (0, 1)}, "2 symbols given"),
         ({"symbols": (0, 1, 2, 4)}, "outside the alphabet"),
         ({"seed": -1}, "seed is -1"),
-        ({"key": Key("x", FAKE_SECRET, Scheme("x", 50.0, (0.5, 5.0), 4, 100, (Channel("a", "a", ("vx",), 1, 0.1),)))},
-         "1 channels and this world 4 robots"),
+        (
+            {
+                "key": Key(
+                    "x",
+                    FAKE_SECRET,
+                    Scheme(
+                        name="x",
+                        rate_hz=50.0,
+                        band_hz=(0.5, 5.0),
+                        alphabet_size=4,
+                        message_ticks=100,
+                        channels=(Channel("a", "a", ("vx",), 1, 0.1),),
+                    ),
+                )
+            },
+            "1 channels and this world 4 robots",
+        ),
     ],
-)  # fmt: skip
+)
 def test_settings_that_make_no_sense_are_refused_in_one_sentence(changes, sentence):
     with pytest.raises(MtmError, match=sentence):
         short_run(**changes)
@@ -106,6 +121,10 @@ def test_settings_that_make_no_sense_are_refused_in_one_sentence(changes, senten
 
 def test_a_channel_that_no_body_velocity_has_is_refused_before_anything_moves():
     joints = tuple(Channel(f"j{number}", f"j{number}", ("elbow",), 1, 0.1) for number in range(4))
-    key = Key("arms", FAKE_SECRET, Scheme("arms", 50.0, (0.5, 5.0), 4, 100, joints))
+    key = Key(
+        "arms",
+        FAKE_SECRET,
+        Scheme(name="arms", rate_hz=50.0, band_hz=(0.5, 5.0), alphabet_size=4, message_ticks=100, channels=joints),
+    )
     with pytest.raises(MtmError, match="elbow"):
-        run_lockstep(RunSettings(key, (0, 1, 2, 3), 2.0, 1, start_s=0.5))
+        run_lockstep(RunSettings(key=key, symbols=(0, 1, 2, 3), seconds=2.0, seed=1, start_s=0.5))

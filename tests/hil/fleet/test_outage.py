@@ -23,7 +23,17 @@ BASE = BodyVelocity(0.2, 0.05, 0.0)
 def outage(tmp_path_factory):
     """24 s of an 8 s message through an outage of 3 s: the motion that a camera saw, and the journal."""
     path = tmp_path_factory.mktemp("outage") / "robot0.csv"
-    header = JournalHeader(KEY.scheme.fingerprint, KEY.id, "robot0", "robot0", SYMBOLS, True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint=KEY.scheme.fingerprint,
+        key_id=KEY.id,
+        robot="robot0",
+        channel="robot0",
+        symbols=SYMBOLS,
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     poses = []
     with can_rig(LineRig, deadman_s=0.2) as rig, Journal(path, header, threaded=False) as journal:
         link = ReconnectingTransport(rig.remake, rig.clock)

@@ -14,10 +14,29 @@ from tests.hil.fleet.short_runs import fake_key, short_run
 
 def journal(ticks, damaged=0):
     count = len(ticks)
-    header = JournalHeader("0" * 16, "fake", "robot0", "robot0", (0, 1, 2, 3), True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake",
+        robot="robot0",
+        channel="robot0",
+        symbols=(0, 1, 2, 3),
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     ticks = np.array(ticks, dtype=np.int64)
     rows, none = np.zeros((count, 3)), np.zeros(count)
-    return JournalRecord(header, ticks, ticks / 50, rows, rows, none, none.astype(np.int64), damaged)
+    return JournalRecord(
+        header=header,
+        ticks=ticks,
+        times_s=ticks / 50,
+        base=rows,
+        sent=rows,
+        lateness_s=none,
+        flags=none.astype(np.int64),
+        damaged=damaged,
+    )
 
 
 def test_missed_ticks_are_counted():

@@ -103,7 +103,9 @@ def test_wheel_speeds_drive_the_robot(node, bus, payload, expected):
 
 def test_what_wants_an_answer_gets_one_and_nothing_else_does(node, bus):
     tell(node, bus, ENGAGE, FORWARD)
-    assert bus.answers == [Message(0xC3, 0x09, 0, 0x80, 0x3F, 0x19, b"\x00")]
+    assert bus.answers == [
+        Message(sender=0xC3, receiver=0x09, sequence=0, attributes=0x80, cmdset=0x3F, cmdid=0x19, payload=b"\x00")
+    ]
     assert bus.ids == {0x202}
 
 
@@ -138,9 +140,11 @@ def test_a_payload_that_contradicts_its_command_is_refused_and_counted(node, bus
 
 
 def test_what_the_robot_does_not_know_is_counted_and_left_unanswered(node, bus):
-    light = Message(0x09, 0x18, 0, 0x40, 0x3F, 0x32, bytes(13))
-    ping = Message(0x0A, 0xC3, 0, 0x40, 0x00, 0x01)
-    push_answer = Message(0x09, 0x03, 0, 0xA0, 0x48, 0x08, b"\x01")
+    light = Message(sender=0x09, receiver=0x18, sequence=0, attributes=0x40, cmdset=0x3F, cmdid=0x32, payload=bytes(13))
+    ping = Message(sender=0x0A, receiver=0xC3, sequence=0, attributes=0x40, cmdset=0x00, cmdid=0x01)
+    push_answer = Message(
+        sender=0x09, receiver=0x03, sequence=0, attributes=0xA0, cmdset=0x48, cmdid=0x08, payload=b"\x01"
+    )
     tell(node, bus, light, ping, push_answer)
     assert node.ignored_messages == 3
     assert bus.answers == []
@@ -154,7 +158,19 @@ def test_frames_of_other_nodes_are_not_listened_to(node, bus):
 
 def test_heartbeats_to_either_half_of_the_robot_are_counted(node, bus):
     tell(node, bus, commands.HEARTBEAT.message(0, commands.HEARTBEAT_PAYLOAD))
-    tell(node, bus, Message(0x09, 0x03, 0, 0, 0x3F, 0x60, commands.HEARTBEAT_PAYLOAD))
+    tell(
+        node,
+        bus,
+        Message(
+            sender=0x09,
+            receiver=0x03,
+            sequence=0,
+            attributes=0,
+            cmdset=0x3F,
+            cmdid=0x60,
+            payload=commands.HEARTBEAT_PAYLOAD,
+        ),
+    )
     assert node.heartbeats == 2
 
 

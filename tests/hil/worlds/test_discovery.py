@@ -20,6 +20,8 @@ from mtm_audit.model.track import Floats
 from mtm_audit.readers.video import read_frames
 from mtm_onboard.protocol import Codebook, MtmError
 
+pytestmark = pytest.mark.long
+
 SECRET = b"not a real secret, only for test"
 TICKS = 72
 WORLD = Discovery()

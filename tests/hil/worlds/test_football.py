@@ -13,6 +13,8 @@ from mtm_onboard.protocol import MtmError
 torch = pytest.importorskip("torch")
 pytest.importorskip("vmas")
 
+pytestmark = pytest.mark.long
+
 TICKS = 20
 SEEDS = (3, 4, 5)
 # A metre in pixels.

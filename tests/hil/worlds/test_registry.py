@@ -13,7 +13,10 @@ def test_every_world_has_its_signal():
     assert set(NAMES) == set(SIGNALS)
 
 
-@pytest.mark.parametrize("name", ["lunar-lander", "reacher", "discovery", "football"])
+@pytest.mark.parametrize(
+    "name",
+    ["lunar-lander", "reacher", *(pytest.param(name, marks=pytest.mark.long) for name in ("discovery", "football"))],
+)
 def test_a_world_s_axes_are_those_of_its_channels(name):
     if name in ("discovery", "football"):
         pytest.importorskip("vmas")
@@ -41,6 +44,7 @@ def test_a_world_without_its_simulator_says_what_to_install(monkeypatch, capsys,
     assert leaving.value.code == 1
     (sentence,) = capsys.readouterr().err.splitlines()
     assert re.search(
-        rf"world {world} needs .*{package}.* is missing; install it with: pip install 'mtm\[worlds\]'", sentence
+        rf"world {world} needs .*{package}.* is missing; install it with: pip install 'messages-.*\[worlds\]'",
+        sentence,
     )
     assert not (tmp_path / "out").exists()

@@ -17,7 +17,15 @@ SECRET = b"not a real secret, only for test"
 def key_path(tmp_path, request):
     schedule, robots = getattr(request, "param", ("rolling", 2))
     channels = tuple(Channel(f"robot{n}", f"robot{n}", ("vx", "vy"), 2, 0.1) for n in range(robots))
-    scheme = Scheme("test", 50.0, (0.5, 5.0), 4, 100, channels, schedule=schedule)
+    scheme = Scheme(
+        name="test",
+        rate_hz=50.0,
+        band_hz=(0.5, 5.0),
+        alphabet_size=4,
+        message_ticks=100,
+        channels=channels,
+        schedule=schedule,
+    )
     save_key(Key("test", SECRET, scheme), tmp_path / "robot.key")
     return tmp_path / "robot.key"
 
@@ -48,7 +56,20 @@ def test_one_channel_needs_no_name_and_a_fixed_message_repeats_unless_told_not_t
 def test_a_framed_message_is_written_as_each_slot_and_day_has_it(tmp_path):
     framing = Framing("text", 16, check="tag", check_bits=16, interleave=True)
     channels = (Channel("robot0", "robot0", ("vx", "vy"), 20, 0.1),)
-    key = Key("test", SECRET, Scheme("test", 50.0, (2.0, 20.0), 4, 400, channels, schedule="rolling", framing=framing))
+    key = Key(
+        "test",
+        SECRET,
+        Scheme(
+            name="test",
+            rate_hz=50.0,
+            band_hz=(2.0, 20.0),
+            alphabet_size=4,
+            message_ticks=400,
+            channels=channels,
+            schedule="rolling",
+            framing=framing,
+        ),
+    )
     save_key(key, tmp_path / "robot.key")
     # The second of these three slots of 8 s begins at midnight.
     _, out = export(tmp_path / "robot.key", "--text", "hi", "--first-message", "10799", "--messages", "3")

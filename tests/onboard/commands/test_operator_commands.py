@@ -40,7 +40,9 @@ def config(tmp_path):
 def test_keygen_provisions_a_framing_and_the_schedule_s_options(tmp_path):
     assert keygen(tmp_path, *FRAMED) == 0
     scheme = load_key(tmp_path / "robot.key").scheme
-    assert scheme.framing == Framing("text", 64, 4, "tag", 32, "reed-solomon", interleave=True)
+    assert scheme.framing == Framing(
+        "text", 64, number_bits=4, check="tag", check_bits=32, code="reed-solomon", interleave=True
+    )
     assert (scheme.schedule, scheme.epoch, scheme.pooling) == ("rolling", 3, "majority")
 
 

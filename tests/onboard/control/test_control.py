@@ -41,9 +41,18 @@ class Robot:
         self.guard = Guard(Limits(1.0, 2.0), Staleness(), noise_sigma=0.1, period_s=0.02)
         self.stats = LoopStats()
         session = Session(
-            "robot0", key, self.modulator, self.guard, HeldSource(), NullTransport(), self.stats, journal,
-            lambda: self.tick, START_UNIX_S, FIRST_SLOT,
-        )  # fmt: skip
+            robot="robot0",
+            key=key,
+            modulator=self.modulator,
+            guard=self.guard,
+            source=HeldSource(),
+            transport=NullTransport(),
+            stats=self.stats,
+            journal=journal,
+            tick=lambda: self.tick,
+            start_unix_s=START_UNIX_S,
+            first_slot=FIRST_SLOT,
+        )
         self.control = Control(session)
 
     def send(self, **content):
@@ -116,7 +125,17 @@ def test_a_robot_that_began_in_silence_gets_its_first_message_at_the_next_bounda
 
 
 def test_silence_ends_the_message_at_the_next_boundary(tmp_path):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (0,) * 4, True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=(0,) * 4,
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
         robot = Robot(key_of(), 7, journal)
         robot.send(number=3)
@@ -141,7 +160,17 @@ def status(robot: Robot, tick: int = 55):
 
 
 def test_the_stop_is_latched_and_noted_in_the_journal(tmp_path):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (0,) * 4, True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=(0,) * 4,
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
         robot = Robot(key_of(), 7, journal)
         assert [robot.send(number=number)["tick"] for number in (3, 4)] == [120, 120]

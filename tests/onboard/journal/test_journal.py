@@ -22,7 +22,17 @@ from mtm_onboard.protocol.journal_file import (
     segments,
 )
 
-HEADER = JournalHeader("0123456789abcdef", "fake-key", "robot0", "a", (0, 3, 1), True, 50.0, 10.0, 1.7e9)
+HEADER = JournalHeader(
+    fingerprint="0123456789abcdef",
+    key_id="fake-key",
+    robot="robot0",
+    channel="a",
+    symbols=(0, 3, 1),
+    repeat=True,
+    rate_hz=50.0,
+    start_s=10.0,
+    start_unix_s=1.7e9,
+)
 BASE, SENT = BodyVelocity(0.1, -0.2, 0.3), BodyVelocity(0.15, -0.25, 1 / 3)
 
 
@@ -70,7 +80,17 @@ def test_what_was_written_is_read_back(tmp_path, threaded):
 
 
 def test_a_journal_without_ticks_and_without_a_message_is_read_back(tmp_path):
-    header = JournalHeader("0123456789abcdef", "fake-key", "robot0", "a", None, True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint="0123456789abcdef",
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=None,
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
         pass
     record = read_journal(journal.path)

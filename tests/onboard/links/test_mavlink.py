@@ -415,7 +415,7 @@ def test_the_documented_options_are_those_it_takes_and_their_defaults(tmp_path):
 
 def test_a_missing_library_is_one_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "pymavlink.dialects.v20", None)
-    with pytest.raises(MtmError, match=r"install mtm\[mavlink\]"):
+    with pytest.raises(MtmError, match=r"install it with: pip install .*\[mavlink\]"):
         MavlinkTransport("udpin:127.0.0.1:14550", profile="copter")
 
 

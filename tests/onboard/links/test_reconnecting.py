@@ -298,7 +298,17 @@ def test_a_robot_that_somebody_takes_over_during_an_outage_is_not_opened_anew(be
 
 
 def test_the_journal_tells_of_the_outage_and_holds_nothing_that_was_not_sent(bench, tmp_path):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (2, 0, 0, 0), True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=(2, 0, 0, 0),
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     with (
         Journal(tmp_path / "a.csv", header, threaded=False) as journal,
         bench.reconnecting() as link,

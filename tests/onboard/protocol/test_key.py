@@ -9,7 +9,12 @@ from mtm_onboard.protocol.key import key_text
 
 FAKE_SECRET = b"not a real secret, only for test"
 SCHEME = Scheme(
-    "test", 50.0, (0.5, 5.0), 4, 600, (Channel("a", "a", ("vx", "vy"), 2, 0.1), Channel("b", "b", ("vx",), 3, 0.1))
+    name="test",
+    rate_hz=50.0,
+    band_hz=(0.5, 5.0),
+    alphabet_size=4,
+    message_ticks=600,
+    channels=(Channel("a", "a", ("vx", "vy"), 2, 0.1), Channel("b", "b", ("vx",), 3, 0.1)),
 )
 
 

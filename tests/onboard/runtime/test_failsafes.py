@@ -133,7 +133,17 @@ def test_a_process_that_stalls_for_seconds_misses_those_ticks_and_obeys_no_comma
 
 
 def test_a_disk_that_fills_up_costs_rows_and_no_tick(tmp_path, monkeypatch):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (2, 0, 0, 0), True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=(2, 0, 0, 0),
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
 
     class FullDisk:
         closed = False

@@ -117,7 +117,17 @@ def test_a_channel_of_joints_is_refused_before_anything_moves():
 
 
 def test_the_journal_tells_what_was_sent_and_why(tmp_path):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (2, 0, 0, 0), True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=(2, 0, 0, 0),
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
         sent = drive(message(), range(60), last_command_s=0.2, stop_s=0.8, journal=journal)
     record = read_journal(journal.path)

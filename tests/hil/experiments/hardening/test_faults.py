@@ -25,7 +25,19 @@ from hil.experiments.runs.cells import Cell, CellStore
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol.journal_file import NOISE, UNSENT, JournalHeader, JournalRecord
 
-FINE = Outcome(0, 0.02, 0.2, 0.2, 0.27, 1, 8, 6, True, True, 1e-6)
+FINE = Outcome(
+    altered=0,
+    arrived_s=0.02,
+    held_s=0.2,
+    lost_stop_s=0.2,
+    silent_stop_s=0.27,
+    losses=1,
+    windows=8,
+    sent=6,
+    message_is_due=True,
+    is_decoded=True,
+    p_value=1e-6,
+)
 
 
 def measured(wire: str, fault: str, loss: str) -> Row:
@@ -55,12 +67,28 @@ def test_a_robot_without_a_deadman_drives_on_while_the_link_is_cut_and_half_a_se
 def recorded(sent, flags=NOISE) -> JournalRecord:
     """A journal of ticks from tick 0 on."""
     count = len(sent)
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "robot0", (3, 1), True, 50.0, START_S, None)
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake-key",
+        robot="robot0",
+        channel="robot0",
+        symbols=(3, 1),
+        repeat=True,
+        rate_hz=50.0,
+        start_s=START_S,
+        start_unix_s=None,
+    )
     nothing = np.zeros((count, 3))
     return JournalRecord(
-        header, np.arange(count), np.arange(count) / 50.0, nothing, np.asarray(sent, float), np.zeros(count),
-        np.full(count, flags), 0,
-    )  # fmt: skip
+        header=header,
+        ticks=np.arange(count),
+        times_s=np.arange(count) / 50.0,
+        base=nothing,
+        sent=np.asarray(sent, float),
+        lateness_s=np.zeros(count),
+        flags=np.full(count, flags),
+        damaged=0,
+    )
 
 
 def run_of(*in_force, sent=None, flags=NOISE) -> FaultRun:

@@ -23,7 +23,10 @@ def test_the_paper_s_numbers_of_cells_are_all_there():
 
 def test_a_cell_of_the_paper_is_as_printed():
     cell = next(
-        cell for cell in paper_entries("lunar-lander") if cell.point == Point("lunar-lander", "main", 4, 288, "2", 8)
+        cell
+        for cell in paper_entries("lunar-lander")
+        if cell.point
+        == Point(world="lunar-lander", arrangement="main", alphabet_size=4, message_ticks=288, symbols="2", goals=8)
     )
     assert (cell.percent, cell.error, cell.margin) == (89.5, 1.6, 0.11)
 

@@ -81,12 +81,34 @@ def test_all_rollouts_of_the_headline_and_a_part_of_the_others_are_asked_for():
 def test_a_cell_is_held_against_the_paper_s_by_their_intervals(right, verdict):
     cell = next(cell for cell in paper_entries("discovery") if cell.percent == 79.0)
     goals = Proportion(right, 400)
-    assert against_the_paper(Row("message", cell.point, "coherency", 50, goals, goals, 0.1, cell)) == verdict
+    assert (
+        against_the_paper(
+            Row(
+                arm="message",
+                point=cell.point,
+                detector="coherency",
+                rollouts=50,
+                goals=goals,
+                symbols=goals,
+                margin=0.1,
+                paper=cell,
+            )
+        )
+        == verdict
+    )
 
 
 def row_of(ticks, detector, right):
     goals = Proportion(right, 400)
-    return Row("message", headline_point("reacher", ticks), detector, 50, goals, goals, 0.1)
+    return Row(
+        arm="message",
+        point=headline_point("reacher", ticks),
+        detector=detector,
+        rollouts=50,
+        goals=goals,
+        symbols=goals,
+        margin=0.1,
+    )
 
 
 def test_the_shortest_message_is_the_last_of_those_read_as_well():

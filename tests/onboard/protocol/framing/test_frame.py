@@ -171,5 +171,5 @@ def test_a_robot_sends_a_code_without_the_package_that_corrects_it(monkeypatch):
     frame = encode_frame(1, framed_scheme(CODED), FAKE_SECRET)
     monkeypatch.setitem(sys.modules, "reedsolo", None)
     assert encode_frame(1, framed_scheme(CODED), FAKE_SECRET) == frame
-    with pytest.raises(MtmError, match=r"install it with: pip install 'mtm\[rs\]'"):
+    with pytest.raises(MtmError, match=r"install it with: pip install 'messages-through-motion\[audit\]'"):
         decode_frame(frame, framed_scheme(CODED), FAKE_SECRET)

@@ -14,7 +14,9 @@ from mtm_onboard.protocol.framing import (
 def split(alphabet_size, counts):
     channels = tuple(Channel(f"c{n}", "b", ("vx",), count, 0.1) for n, count in enumerate(counts))
     ticks = 100 * 60
-    return Scheme("t", 50.0, (0.5, 5.0), alphabet_size, ticks, channels)
+    return Scheme(
+        name="t", rate_hz=50.0, band_hz=(0.5, 5.0), alphabet_size=alphabet_size, message_ticks=ticks, channels=channels
+    )
 
 
 @given(st.integers(2, 65_536), st.lists(st.sampled_from([1, 2, 3, 4, 5]), min_size=1, max_size=5), st.data())
@@ -47,7 +49,15 @@ def test_symbols_that_spell_no_message_are_recognised():
 
 def test_in_the_same_mode_every_channel_plays_the_whole_message():
     channels = (Channel("x", "b", ("vx",), 2, 0.1), Channel("y", "b", ("vy",), 2, 0.1))
-    scheme = Scheme("t", 50.0, (0.5, 5.0), 4, 600, channels, combine="same")
+    scheme = Scheme(
+        name="t",
+        rate_hz=50.0,
+        band_hz=(0.5, 5.0),
+        alphabet_size=4,
+        message_ticks=600,
+        channels=channels,
+        combine="same",
+    )
     assert channel_symbols((1, 3), scheme) == {"x": (1, 3), "y": (1, 3)}
     with pytest.raises(MtmError, match="3 symbols given"):
         channel_symbols((1, 2, 3), scheme)

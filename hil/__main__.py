@@ -1,0 +1,21 @@
+"""`mtm-hil` and `python -m hil`: the command line, or one sentence when a library is missing."""
+
+import sys
+from collections.abc import Sequence
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run one command; leaves through SystemExit with the exit code."""
+    try:
+        from hil import cli
+
+        cli.main(arguments)
+    except ModuleNotFoundError as error:
+        from mtm_onboard.protocol.installing import missing_sentence
+
+        print(f"mtm-hil: {missing_sentence(error, 'mtm-hil', 'hil')}", file=sys.stderr)
+        raise SystemExit(1) from None
+
+
+if __name__ == "__main__":
+    main()
