@@ -50,7 +50,7 @@ def false_alarms(
     with reported_console() as console:
         from hil.commands.false_alarms import false_alarms as run
 
-        run(decodes, detector, seed, workers, out, cells, console)
+        run(decodes, detector, seed, workers, out=out, cells=cells, console=console)
 
 
 def messages(
@@ -137,17 +137,17 @@ def sweep(
         from hil.commands.sweep import sweep as run
 
         options = SweepOptions(
-            world,
-            rollouts,
-            tuple(alphabet or ()),
-            tuple(window or ()),
-            windows,
-            scheme,
-            detector,
-            first_seed,
-            workers,
-            out,
-            cells,
+            world=world,
+            rollouts=rollouts,
+            alphabet_sizes=tuple(alphabet or ()),
+            window_ticks=tuple(window or ()),
+            windows=windows,
+            scheme=scheme,
+            detector=detector,
+            first_seed=first_seed,
+            workers=workers,
+            out=out,
+            cells=cells,
         )
         run(options, console)
 
