@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.fleet.clock import SimulatedClock
-from hil.fleet.direct import DirectTransport
+from hil.fleet.direct import DirectLink
 from hil.fleet.rig import LIMITS, SAMPLE_PERIOD_S, RobotReport, RunResult, RunSettings, Wire, seeds_of
 from hil.plants.mecanum import MecanumPlant
 from hil.sensors.poses import Floats, Trajectory
@@ -21,8 +21,8 @@ from hil.wires.byte_pipe import PipeEnd, byte_pipe
 from hil.wires.can_line import can_line
 from hil.wires.plaintext_line import plaintext_line
 from hil.worlds.robomaster import Route, Task, routes
-from mtm_onboard.links.base import Transport
-from mtm_onboard.links.mavlink import MavlinkTransport
+from mtm_onboard.links.base import Link
+from mtm_onboard.links.mavlink import MavlinkLink
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.model.velocity import STOP
 from mtm_onboard.protocol import Channel
@@ -44,7 +44,7 @@ class _Link:
     `lets_go` says whether a stop over this wire switches the motors off as well.
     """
 
-    transport: Transport
+    transport: Link
     poll: Callable[[float], None]
     faults: Callable[[], int]
     shutdown: Callable[[], None]
@@ -125,11 +125,11 @@ def _loop(settings: RunSettings, clock: SimulatedClock, step: Callable[[int, flo
 
 
 @contextmanager
-def _opened(transports: list[Transport], clock: SimulatedClock) -> Iterator[None]:
+def _opened(transports: list[Link], clock: SimulatedClock) -> Iterator[None]:
     with ExitStack() as stack:
         for transport in transports:
             stack.enter_context(transport)
-            if not isinstance(transport, DirectTransport):
+            if not isinstance(transport, DirectLink):
                 clock.every(transport.service_period_s, transport.service)
         yield
 
@@ -202,7 +202,7 @@ def _plaintext_link(controller: MotionController) -> _Link:
 
 
 def _mavlink_link(vehicle: MavlinkVehicle, ours: PipeEnd, clock: SimulatedClock) -> _Link:
-    transport = MavlinkTransport(profile="copter", clock=clock, open_port=lambda: ours)
+    transport = MavlinkLink(profile="copter", clock=clock, open_port=lambda: ours)
 
     def faults() -> int:
         health = transport.health()
@@ -213,7 +213,7 @@ def _mavlink_link(vehicle: MavlinkVehicle, ours: PipeEnd, clock: SimulatedClock)
 
 
 def _direct_link(controller: MotionController, clock: SimulatedClock) -> _Link:
-    return _Link(DirectTransport(controller, clock), controller.advance, lambda: controller.faults, lambda: None)
+    return _Link(DirectLink(controller, clock), controller.advance, lambda: controller.faults, lambda: None)
 
 
 def _trajectories(names: list[str], motion: Floats) -> tuple[Trajectory, ...]:

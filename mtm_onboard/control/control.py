@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mtm_onboard.journal.journal import Journal
-from mtm_onboard.links.base import Transport
+from mtm_onboard.links.base import Link
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.runtime.guard import Guard
 from mtm_onboard.runtime.loop import LoopStats
@@ -41,7 +41,7 @@ class Session:
     modulator: Modulator
     guard: Guard
     source: Source
-    transport: Transport
+    transport: Link
     stats: LoopStats
     journal: Journal | None
     tick: Callable[[], int]

@@ -13,9 +13,9 @@ from mtm_onboard.control.control import Control, Session
 from mtm_onboard.control.control_socket import ControlSocket
 from mtm_onboard.control.service_manager import ServiceManager
 from mtm_onboard.journal.journal import Journal, JournalHeader
-from mtm_onboard.links.base import Transport
-from mtm_onboard.links.factory import make_transport
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.base import Link
+from mtm_onboard.links.factory import make_link
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.model.clock import Clock, SystemClock
 from mtm_onboard.protocol import Key, MtmError, Scheme
 from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
@@ -55,7 +55,7 @@ class Ends:
     """Where base commands come from and where commands go, when the caller has both already."""
 
     source: Source
-    transport: Transport
+    transport: Link
 
 
 @dataclass(frozen=True)
@@ -145,18 +145,18 @@ def run_session(
             run_loop(clock, rate_hz, runtime.step, start_s=start_s, stop=ending, stats=stats)
         if service.error is not None:
             raise MtmError(f"the robot's link failed ({service.error}); check the link") from service.error
-    return Outcome(stats, guard, source, journal, runtime.transport_errors)
+    return Outcome(stats, guard, source, journal, runtime.link_losses)
 
 
 def _warn(text: str) -> None:
     print(f"mtm-onboard: {text}", file=sys.stderr)
 
 
-def _link(config: RobotConfig, clock: Clock) -> Transport:
-    def make() -> Transport:
-        return make_transport(config.transport_kind, config.transport_options)
+def _link(config: RobotConfig, clock: Clock) -> Link:
+    def make() -> Link:
+        return make_link(config.transport_kind, config.transport_options)
 
-    return ReconnectingTransport(make, clock, give_up_s=config.link.give_up_s) if config.link.reconnect else make()
+    return ReconnectingLink(make, clock, give_up_s=config.link.give_up_s) if config.link.reconnect else make()
 
 
 def start_of(plan: Plan, scheme: Scheme, now_unix_s: float) -> tuple[float, int]:

@@ -17,7 +17,7 @@ class TakenOverError(MtmError):
     """Somebody else, such as a pilot, has taken the robot over; whoever meets this must not open the link anew."""
 
 
-class Transport(ABC):
+class Link(ABC):
     """A link to one robot. As a context manager it opens the link, and leaving it always sends stop and closes.
 
     A subclass implements `open`, `send`, `stop` and `close`. `send` refuses non-finite velocities with ValueError

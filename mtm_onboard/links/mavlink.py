@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from mtm_onboard.links.base import TakenOverError, Transport
+from mtm_onboard.links.base import Link, TakenOverError
 from mtm_onboard.links.mavlink_codec import MavlinkCodec
 from mtm_onboard.links.mavlink_messages import (
     COMPANION_COMPONENT,
@@ -37,7 +37,7 @@ _MOST_READS = 64  # so that a babbling line cannot hold its reader for ever
 _BEAT_SLACK = 1e-6
 
 
-class MavlinkTransport(Transport):
+class MavlinkLink(Link):
     """One vehicle of the kind `profile` (rover, copter or px4) at `endpoint`, see `mavlink_ports.port_opener`.
 
     The pilot comes first. `open` refuses until the vehicle is in GUIDED (PX4: OFFBOARD) and armed; only with

@@ -5,7 +5,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from mtm_onboard.links.base import LinkBusyError, TakenOverError, Transport
+from mtm_onboard.links.base import Link, LinkBusyError, TakenOverError
 from mtm_onboard.model.clock import Clock
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
@@ -21,7 +21,7 @@ _LONGEST_PERIOD_S = 0.05
 _SETTLED_S = 5.0
 
 
-class ReconnectingTransport(Transport):
+class ReconnectingLink(Link):
     """One robot's link, made anew by `make` after it failed; `clock` is the runtime's.
 
     A `send` or `service` that fails takes the link down, as do several `LinkBusyError` in a row. While it is down,
@@ -34,7 +34,7 @@ class ReconnectingTransport(Transport):
     That nothing moves before a base command has come over the new link is the runtime's part, see `up_since_s`.
     """
 
-    def __init__(self, make: Callable[[], Transport], clock: Clock, *, give_up_s: float = math.inf) -> None:
+    def __init__(self, make: Callable[[], Link], clock: Clock, *, give_up_s: float = math.inf) -> None:
         self.dropped = 0
         self.losses = 0
         self.fault = ""
@@ -43,7 +43,7 @@ class ReconnectingTransport(Transport):
         self._clock = clock
         self._give_up_s = give_up_s
         self._lock = threading.Lock()
-        self._link: Transport | None = make()
+        self._link: Link | None = make()
         self._engaged = False
         self._told_to_stop = True
         self._busy = 0
@@ -60,7 +60,7 @@ class ReconnectingTransport(Transport):
         return own | ({} if link is None else link.health())
 
     @property
-    def link(self) -> Transport | None:
+    def link(self) -> Link | None:
         """The link in use, or the one that was lost until it is released."""
         return self._link
 
@@ -148,7 +148,7 @@ class ReconnectingTransport(Transport):
         elif self._engaged and now_s >= self._next_try_s:
             self._reopen()
 
-    def _lose(self, link: Transport, error: Exception) -> None:
+    def _lose(self, link: Link, error: Exception) -> None:
         with self._lock:
             if link is not self._link or self.up_since_s is None:
                 return
@@ -164,7 +164,7 @@ class ReconnectingTransport(Transport):
             self._next_try_s = now_s + self._pause_s
             self.up_since_s = None
 
-    def _release(self, link: Transport) -> None:
+    def _release(self, link: Link) -> None:
         told = False
         # A lost link carries the stop no farther than it can; the robot's own deadman is what remains.
         with suppress(Exception):

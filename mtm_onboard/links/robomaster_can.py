@@ -4,7 +4,7 @@ import threading
 import time
 from typing import Any, Final
 
-from mtm_onboard.links.base import LinkBusyError, Transport
+from mtm_onboard.links.base import Link, LinkBusyError
 from mtm_onboard.links.can_stream import Bus, CanStream
 from mtm_onboard.links.duml import ACK, Message
 from mtm_onboard.links.robomaster_messages import (
@@ -49,7 +49,7 @@ _STOP_PAUSE_S = 0.005
 _BEAT_SLACK = 1e-6
 
 
-class RoboMasterCan(Transport):
+class RoboMasterCan(Link):
     """One RoboMaster on one CAN bus.
 
     Give either an opened python-can `bus`, which serves for one `open` and is shut down by `close`, or what `can.Bus`

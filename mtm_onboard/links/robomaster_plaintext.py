@@ -6,8 +6,8 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Final
 
-from mtm_onboard.links.base import Transport
-from mtm_onboard.links.byte_link import ByteLink
+from mtm_onboard.links.base import Link
+from mtm_onboard.links.byte_stream import ByteStream
 from mtm_onboard.links.plaintext_messages import (
     ENTER,
     FREE_MODE,
@@ -46,7 +46,7 @@ class PlaintextTelemetry:
     heading_rad: float | None
 
 
-class RoboMasterPlaintext(Transport):
+class RoboMasterPlaintext(Link):
     """One RoboMaster EP in SDK mode. `open` does not wait for the robot's answers; `service` reads them.
 
     The robot answers every command. When the last `MOST_UNANSWERED` are without an answer (it is off, it lags behind,
@@ -66,7 +66,7 @@ class RoboMasterPlaintext(Transport):
         self.malformed = 0
         self.link_errors = 0
         self._lock = threading.Lock()
-        self._link: ByteLink | None = None
+        self._link: ByteStream | None = None
         self._splitter = Splitter()
         self._engaged = False
         self._lost: MtmError | None = None
@@ -75,7 +75,7 @@ class RoboMasterPlaintext(Transport):
         self._telemetry: PlaintextTelemetry | None = None
 
     @abstractmethod
-    def _connect(self) -> ByteLink:
+    def _connect(self) -> ByteStream:
         """Open the line to the robot; raises MtmError when it cannot be had."""
 
     def _datagrams(self) -> list[bytes]:
@@ -197,14 +197,14 @@ class RoboMasterPlaintext(Transport):
         with self._lock:
             self._write(self._working_link(), text)
 
-    def _working_link(self) -> ByteLink:
+    def _working_link(self) -> ByteStream:
         if self._link is None or not self._engaged:
             raise MtmError("The link to the robot is not open, or was stopped; open it before sending.")
         if self._lost is not None:
             raise MtmError(str(self._lost)) from self._lost
         return self._link
 
-    def _write(self, link: ByteLink, text: bytes) -> None:
+    def _write(self, link: ByteStream, text: bytes) -> None:
         try:
             # Without waiting for room: where a host's whole queue is full, one more command would be obeyed too late.
             link.write(text, 0.0)
@@ -212,7 +212,7 @@ class RoboMasterPlaintext(Transport):
             self.link_errors += 1
             raise
 
-    def _persist(self, link: ByteLink, text: bytes) -> MtmError | None:
+    def _persist(self, link: ByteStream, text: bytes) -> MtmError | None:
         fault = None
         for _ in range(_STOP_TRIES):
             try:

@@ -4,7 +4,7 @@ import threading
 from types import TracebackType
 from typing import Self
 
-from mtm_onboard.links.base import Transport
+from mtm_onboard.links.base import Link
 from mtm_onboard.model.clock import Clock
 
 # Above the longest that opening or stopping a link takes.
@@ -12,15 +12,15 @@ _LONGEST_FAREWELL_S = 5.0
 
 
 class ServiceThread:
-    """Calls `transport.service` each `service_period_s` while its block runs; the first failure ends it.
+    """Calls `link.service` each `service_period_s` while its block runs; the first failure ends it.
 
     `error` holds that failure, and whoever runs the loop stops the robot for it. A call that never returns, such as a
     write to a wedged driver, is left behind when the block ends.
     """
 
-    def __init__(self, transport: Transport, clock: Clock) -> None:
+    def __init__(self, link: Link, clock: Clock) -> None:
         self.error: BaseException | None = None
-        self._transport = transport
+        self._link = link
         self._clock = clock
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="service", daemon=True)
@@ -28,8 +28,8 @@ class ServiceThread:
     def _run(self) -> None:
         try:
             while not self._ending.is_set():
-                self._transport.service(self._clock.now())
-                self._ending.wait(self._transport.service_period_s)
+                self._link.service(self._clock.now())
+                self._ending.wait(self._link.service_period_s)
         except BaseException as error:
             # Whatever ends this thread, nobody serves the link any more.
             self.error = error

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from hil.fleet.clock import SimulatedClock
 from mtm_onboard.journal.journal import Journal
-from mtm_onboard.links.base import Transport
+from mtm_onboard.links.base import Link
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.runtime.guard import Guard, Limits, Staleness
 from mtm_onboard.runtime.loop import LoopStats, run_loop
@@ -22,7 +22,7 @@ class Driven:
 
     def __init__(
         self,
-        transport: Transport,
+        transport: Link,
         clock: SimulatedClock,
         modulator: NoiseAdder | None = None,
         limits: Limits | None = None,

@@ -30,7 +30,7 @@ from mtm_audit.detectors.base import Observation
 from mtm_audit.model.glimpse import glimpse_of_track
 from mtm_audit.significance.decoys import decoy_codebooks
 from mtm_onboard.journal.journal import DEFAULT_MAX_BYTES, Journal, JournalHeader
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.protocol import Channel, Key, MtmError, Scheme
 from mtm_onboard.protocol.journal_file import segments
@@ -125,7 +125,7 @@ class _Robot:
         self._plant = MecanumPlant(calibrated_parameters(), seed)
         ours, theirs = can_line()
         self._node = CanMotionController(MotionController(self._plant), theirs)
-        self._link = ReconnectingTransport(lambda: RoboMasterCan(ours), clock)
+        self._link = ReconnectingLink(lambda: RoboMasterCan(ours), clock)
         self._task = ERRANDS["orbit"](Route((0.0, 0.0), ()), seed)
         rate_hz = _SCHEME.rate_hz
         header = JournalHeader(

@@ -13,12 +13,12 @@ from hil.vehicles.motion_controller import MotionController
 from hil.vehicles.plaintext_node import PlaintextMotionController
 from hil.wires.byte_pipe import PipeEnd
 from hil.wires.can_line import LineEnd
-from hil.wires.plaintext_line import LineTransport
+from hil.wires.plaintext_line import LineLink
 from hil.wires.plaintext_ports import Port
-from mtm_onboard.links.byte_link import ByteLink
+from mtm_onboard.links.byte_stream import ByteStream
 from mtm_onboard.links.can_stream import CanStream
 from mtm_onboard.links.duml import Message, encode
-from mtm_onboard.links.mavlink import MavlinkTransport
+from mtm_onboard.links.mavlink import MavlinkLink
 from mtm_onboard.links.mavlink_profiles import PROFILES, Profile
 from mtm_onboard.links.mavlink_state import VehicleState
 from mtm_onboard.links.robomaster_can import RoboMasterCan
@@ -96,10 +96,10 @@ class HearingServer(PlaintextMotionController):
             self._hears(as_text(text) + b";")
 
 
-class HearingPlaintext(LineTransport):
+class HearingPlaintext(LineLink):
     """The plaintext transport, which tells of what it does not call malformed."""
 
-    def __init__(self, link: ByteLink, hears: Hears) -> None:
+    def __init__(self, link: ByteStream, hears: Hears) -> None:
         super().__init__(link)
         self._hears = hears
 
@@ -123,7 +123,7 @@ class HearingVehicle(MavlinkVehicle):
         super()._take(message, now_s)
 
 
-class HearingMavlink(MavlinkTransport):
+class HearingMavlink(MavlinkLink):
     """The MAVLink transport."""
 
     def __init__(self, port: PipeEnd, clock: SimulatedClock, hears: Hears) -> None:

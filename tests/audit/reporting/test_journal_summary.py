@@ -8,7 +8,7 @@ from hil.fleet.clock import SimulatedClock
 from mtm_audit.cli import main
 from mtm_audit.reporting.journal_summary import injected_noise, summary_of
 from mtm_onboard.journal.journal import Journal
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.journal_file import CLAMPED, NOISE, UNSENT, JournalHeader, read_journal
@@ -27,7 +27,7 @@ def run(tmp_path):
     """Six seconds of a message, and then a second of stale commands."""
     clock = SimulatedClock()
     with Journal(tmp_path / "run.csv", HEADER, threaded=False) as journal:
-        driven = Driven(NullTransport(), clock, MESSAGE, Limits(1.0, 2.0, noise_sigmas=2.0), journal=journal)
+        driven = Driven(NullLink(), clock, MESSAGE, Limits(1.0, 2.0, noise_sigmas=2.0), journal=journal)
         driven.run(6.0, BASE)
         driven.run(1.0)
         driven.source.stop()

@@ -5,7 +5,7 @@ import pytest
 
 from mtm_onboard.control.control import Control, Session
 from mtm_onboard.journal.journal import Journal, JournalHeader, read_journal
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.protocol.framing import Framing
@@ -41,7 +41,7 @@ class Robot:
         self.guard = Guard(Limits(1.0, 2.0), Staleness(), noise_sigma=0.1, period_s=0.02)
         self.stats = LoopStats()
         session = Session(
-            "robot0", key, self.modulator, self.guard, HeldSource(), NullTransport(), self.stats, journal,
+            "robot0", key, self.modulator, self.guard, HeldSource(), NullLink(), self.stats, journal,
             lambda: self.tick, START_UNIX_S, FIRST_SLOT,
         )  # fmt: skip
         self.control = Control(session)

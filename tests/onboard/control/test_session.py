@@ -7,7 +7,7 @@ from itertools import count
 import pytest
 
 from mtm_onboard.control.session import Plan, run_session
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Channel, Key, MtmError
 from mtm_onboard.runtime.config import LinkSettings, RealtimeSettings, RobotConfig, config_from_table
@@ -16,7 +16,7 @@ from tests.onboard.schemes import FAKE_SECRET, small_scheme
 KEY = Key("fake-key", FAKE_SECRET, small_scheme())
 
 
-class Link(NullTransport):
+class Link(NullLink):
     """Fails where it is told to, and keeps what happened in order."""
 
     def __init__(self, failing: str = "", failing_from: int = 2) -> None:
@@ -65,7 +65,7 @@ def use(monkeypatch):
     monkeypatch.setattr("mtm_onboard.control.session.StdinSource", Silence)
 
     def patch(link: Link) -> Link:
-        monkeypatch.setattr("mtm_onboard.control.session.make_transport", lambda kind, options: link)
+        monkeypatch.setattr("mtm_onboard.control.session.make_link", lambda kind, options: link)
         return link
 
     return patch

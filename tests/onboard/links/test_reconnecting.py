@@ -11,8 +11,8 @@ from hil.vehicles.motion_controller import MotionController
 from hil.wires.slcan_port import SlcanPort
 from mtm_onboard.journal.journal import Journal
 from mtm_onboard.links.base import LinkBusyError, TakenOverError
-from mtm_onboard.links.none import NullTransport
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.none import NullLink
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
@@ -22,17 +22,17 @@ from mtm_onboard.runtime.modulator import Modulator
 from tests.hil.vehicles.floating_plant import FloatingPlant
 from tests.onboard.driven import Driven
 from tests.onboard.links.can_rig import VirtualRig, can_rig
-from tests.onboard.links.conformance import Rig, TransportConformance
+from tests.onboard.links.conformance import LinkConformance, Rig
 from tests.onboard.schemes import small_codebook
 
 BASE = BodyVelocity(0.3, -0.1, 0.5)
 
 
-class TestReconnectingConforms(TransportConformance):
+class TestReconnectingConforms(LinkConformance):
     @pytest.fixture
     def rig(self):
         with can_rig(VirtualRig) as rig:
-            link = ReconnectingTransport(rig.remake, rig.clock)
+            link = ReconnectingLink(rig.remake, rig.clock)
             rig.clock.every(link.service_period_s, link.service)
             yield Rig(
                 link, rig.controller, rig.plant, rig.clock, lambda: sum(map(len, rig.sent())), clog=rig.clog,
@@ -59,13 +59,13 @@ class Bench:
     def times_s(self, name: str) -> list[float]:
         return [when_s for when_s, what in self.events if what == name]
 
-    def reconnecting(self, **options) -> ReconnectingTransport:
-        link = ReconnectingTransport(self.make, self.clock, **options)
+    def reconnecting(self, **options) -> ReconnectingLink:
+        link = ReconnectingLink(self.make, self.clock, **options)
         self.clock.every(link.service_period_s, link.service)
         return link
 
 
-class BenchLink(NullTransport):
+class BenchLink(NullLink):
     def __init__(self, bench: Bench) -> None:
         super().__init__()
         self.bench = bench
@@ -403,7 +403,7 @@ class Adapter:
 
 def test_a_serial_adapter_that_is_unplugged_and_plugged_in_again_drives_on():
     adapter = Adapter()
-    link = ReconnectingTransport(adapter.make, adapter.clock)
+    link = ReconnectingLink(adapter.make, adapter.clock)
     adapter.clock.every(link.service_period_s, link.service)
     forward = BodyVelocity(0.5, 0.0, 0.0)
     try:
@@ -430,7 +430,7 @@ def test_a_serial_adapter_that_is_unplugged_and_plugged_in_again_drives_on():
 
 def test_a_serial_adapter_that_stops_reading_is_a_lost_link_and_holds_up_no_tick():
     adapter = Adapter()
-    link = ReconnectingTransport(adapter.make, adapter.clock, give_up_s=math.inf)
+    link = ReconnectingLink(adapter.make, adapter.clock, give_up_s=math.inf)
     link.open()
     driven = Driven(link, adapter.clock)
     # Nobody polls the far end from here on, and nobody serves the link.

@@ -14,12 +14,12 @@ from mtm_onboard.links.robomaster_messages import WORK_MODE
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
 from tests.onboard.links.can_rig import LineRig, VirtualRig, can_rig
-from tests.onboard.links.conformance import Rig, TransportConformance
+from tests.onboard.links.conformance import LinkConformance, Rig
 
 FORWARD = BodyVelocity(0.5, 0.0, 0.0)
 
 
-class TestRoboMasterCanConforms(TransportConformance):
+class TestRoboMasterCanConforms(LinkConformance):
     @pytest.fixture(params=[VirtualRig, LineRig])
     def rig(self, request):
         with can_rig(request.param) as rig:

@@ -1,11 +1,11 @@
 import threading
 
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.clock import SystemClock
 from mtm_onboard.runtime.service import ServiceThread
 
 
-class Attended(NullTransport):
+class Attended(NullLink):
     """Tells when it was served three times, and fails after that when asked to."""
 
     service_period_s = 0.001
@@ -42,7 +42,7 @@ def test_a_failure_ends_the_service_and_is_kept():
 
 
 def test_whatever_ends_the_thread_is_an_error():
-    class Ending(NullTransport):
+    class Ending(NullLink):
         def service(self, now_s: float) -> None:
             raise SystemExit
 
@@ -55,7 +55,7 @@ def test_a_call_that_never_returns_does_not_hold_up_the_end(monkeypatch):
     monkeypatch.setattr("mtm_onboard.runtime.service._LONGEST_FAREWELL_S", 0.05)
     begun, released = threading.Event(), threading.Event()
 
-    class Wedged(NullTransport):
+    class Wedged(NullLink):
         def service(self, now_s: float) -> None:
             begun.set()
             released.wait(20.0)

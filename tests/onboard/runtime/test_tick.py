@@ -7,7 +7,7 @@ import pytest
 
 from hil.fleet.clock import SimulatedClock
 from mtm_onboard.journal.journal import Journal, JournalHeader, read_journal
-from mtm_onboard.links.base import Transport
+from mtm_onboard.links.base import Link
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Channel, MtmError
 from mtm_onboard.runtime.guard import NOISE, STALE, STOPPED, Guard, Limits, Staleness
@@ -20,7 +20,7 @@ from tests.onboard.schemes import small_codebook
 BASE = BodyVelocity(0.3, -0.1, 0.5)
 
 
-class Listener(Transport):
+class Listener(Link):
     """Keeps what was sent; fails from the command number `failing_from` on."""
 
     def __init__(self, failing_from: float = math.inf, *, stop_fails: bool = False) -> None:
@@ -101,7 +101,7 @@ def test_a_link_that_fails_stops_the_robot_and_the_run():
         runtime.step(tick, tick / 50.0)
     with pytest.raises(MtmError, match="cable pulled.*told to stop"):
         runtime.step(3, 0.06)
-    assert (link.stops, runtime.transport_errors) == (1, 1)
+    assert (link.stops, runtime.link_losses) == (1, 1)
 
 
 def test_a_link_on_which_even_the_stop_fails_says_so():
