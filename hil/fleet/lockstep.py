@@ -101,7 +101,7 @@ def _run(settings: RunSettings, clock: SimulatedClock, robots: list[_Robot]) -> 
             x_m, y_m = plant.position_xy_m
             poses.extend((x_m, y_m, plant.heading_rad))
 
-    def step(tick: int, now_s: float) -> None:
+    def step(tick: int, now_s: float, _late_s: float) -> None:
         for robot in robots:
             robot.step(tick, now_s)
 
@@ -116,7 +116,7 @@ def _run(settings: RunSettings, clock: SimulatedClock, robots: list[_Robot]) -> 
     return RunResult(_trajectories(names, motion), settings.onset_s, tuple(robot.report(stats) for robot in robots))
 
 
-def _loop(settings: RunSettings, clock: SimulatedClock, step: Callable[[int, float], None]) -> LoopStats:
+def _loop(settings: RunSettings, clock: SimulatedClock, step: Callable[[int, float, float], None]) -> LoopStats:
     # A tick that falls on the very end would have no motion to show.
     end_s = settings.seconds - 1e-6
     return run_loop(

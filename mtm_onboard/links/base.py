@@ -1,6 +1,5 @@
 """The seam between the runtime and a robot: one body velocity out, and always a stop at the end."""
 
-import math
 from abc import ABC, abstractmethod
 from types import TracebackType
 from typing import Self
@@ -26,17 +25,14 @@ class Link(ABC):
     whole messages with a lock. `write_bound_s` is the longest that `send` may wait for the far end. `has_deadman` says
     whether the robot stops by itself when no commands come; one that does not goes on until the link is back.
 
-    For a link that may go and come back: `up_since_s` is when it came up last on the runtime's clock (-inf for a link
-    that is up from `open` to `stop`, None while it is down), `dropped` counts commands that `send` took without an
-    error and that never left, and `fault` says why the link went down.
+    A link that has reason to doubt that it is obeyed says why in `degraded`, which is empty otherwise; one that knows
+    it is not raises from `send`. Opening it anew is not its own affair, see `reconnecting`.
     """
 
     service_period_s: float = 0.010
     write_bound_s: float = 0.005
     has_deadman: bool = True
-    up_since_s: float | None = -math.inf
-    dropped: int = 0
-    fault: str = ""
+    degraded: str = ""
 
     @abstractmethod
     def open(self) -> None:
@@ -64,9 +60,13 @@ class Link(ABC):
     def service(self, now_s: float) -> None:  # noqa: B027 - most links need nothing between commands
         """Do what is due at `now_s` (seconds of the runtime's clock)."""
 
-    def health(self) -> dict[str, int | float | str | bool]:
-        """Counters and states of the link by name, for reports; empty when the link keeps none."""
+    def counters(self) -> dict[str, int]:
+        """What was counted since the link was made, by name, for reports; empty when it counts nothing."""
         return {}
+
+    def health(self) -> dict[str, int | float | str | bool]:
+        """The counters and, beside them, states of the link by name, for reports."""
+        return {**self.counters()}
 
     def __enter__(self) -> Self:
         self.open()

@@ -41,10 +41,10 @@ class Driven:
         """Tick for so long, with a fresh base command in each tick, or none."""
         end_s = self.clock.now() + seconds - 1e-9
 
-        def step(tick: int, now_s: float) -> None:
+        def step(tick: int, now_s: float, late_s: float) -> bool:
             if base is not None:
                 self.source.set(base, now_s)
-            self._runtime.step(tick, now_s)
+            return self._runtime.step(tick, now_s, late_s)
 
         run_loop(
             self.clock, RATE_HZ, step, start_s=0.0, stop=lambda: stop() or self.clock.now() >= end_s, stats=self.stats

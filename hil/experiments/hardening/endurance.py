@@ -164,15 +164,15 @@ class _Robot:
         """Everything but what the film shows."""
         stats, guard, journal = self._stats, self._guard, self._journal
         return Checkpoint(
-            elapsed_s=self._clock.now(), ticks=stats.sent, missed=stats.missed, clamped=guard.clamped,
+            elapsed_s=self._clock.now(), ticks=stats.sent + stats.unsent, missed=stats.missed, clamped=guard.clamped,
             disturbed=guard.stale + guard.refused + guard.held + guard.unsent, faults=self._faults(),
             resident_bytes=_resident_bytes(), journal_lost=journal.lost,
             journal_bytes=sum(part.stat().st_size for part in segments(journal.path)), cpu_s=time.process_time(),
         )  # fmt: skip
 
-    def _step(self, tick: int, now_s: float) -> None:
+    def _step(self, tick: int, now_s: float, late_s: float) -> bool:
         self._source.set(self._task.command(self._plant.position_xy_m, self._plant.heading_rad), now_s)
-        self._runtime.step(tick, now_s)
+        return self._runtime.step(tick, now_s, late_s)
 
     def _poll(self, now_s: float) -> None:
         self._node.poll(now_s)

@@ -438,7 +438,7 @@ def test_a_vehicle_is_driven_over_udp_in_real_time():
         with transport, ServiceThread(transport, clock) as service:
             start_s = clock.now()
 
-            def step(_tick, _now_s):
+            def step(_tick, _now_s, _late_s):
                 transport.send(BodyVelocity(0.5, 0.25, 0.0))
 
             run_loop(clock, 50.0, step, start_s=start_s, stop=lambda: clock.now() > start_s + 1.0)

@@ -114,7 +114,7 @@ def test_while_the_link_is_down_ticks_go_on_and_openings_are_tried_ever_more_rar
     driven.run(0.1, BASE)
     bench.error, bench.is_absent = OSError("cable pulled"), True
     driven.run(20.0, BASE)
-    assert driven.stats.sent == 5 + 1000
+    assert (driven.stats.sent, driven.stats.unsent) == (5, 1000)
     assert (link.losses, link.dropped, driven.guard.unsent) == (1, 1000, 1000)
     assert link.fault == "no such port"
     pauses_s = np.diff([0.1, *bench.times_s("open")[1:]])
@@ -327,10 +327,33 @@ def test_the_journal_tells_of_the_outage_and_holds_nothing_that_was_not_sent(ben
 
 def test_health_is_the_wrapper_s_and_the_link_s(bench):
     with bench.reconnecting() as link:
-        assert link.health() == {"link_up": True, "link_losses": 0, "dropped": 0}
+        assert link.health() == {
+            "link_up": True, "link_state": "up", "link_trouble": "", "link_losses": 0, "dropped": 0,
+        }  # fmt: skip
         bench.service_error, bench.is_absent = OSError("no heartbeat"), True
         bench.clock.sleep_until(0.5)
-        assert link.health() == {"link_up": False, "link_losses": 1, "dropped": 0}
+        assert link.health() == {
+            "link_up": False, "link_state": "down", "link_trouble": "no such port", "link_losses": 1, "dropped": 0,
+        }  # fmt: skip
+
+
+def test_a_degraded_link_is_up_and_says_why(bench):
+    with bench.reconnecting() as link:
+        link.link.degraded = "no telemetry"
+        health = link.health()
+        assert (health["link_up"], health["link_state"], health["link_trouble"]) == (True, "degraded", "no telemetry")
+
+
+def test_counters_go_on_over_all_the_links_that_were_used(bench, monkeypatch):
+    monkeypatch.setattr(BenchLink, "counters", lambda self: {"refusals": 2}, raising=False)
+    with bench.reconnecting() as link:
+        for _ in range(2):
+            bench.service_error = OSError("no heartbeat")
+            bench.clock.sleep_until(bench.clock.now() + 0.02)
+            bench.service_error = None
+            bench.clock.sleep_until(bench.clock.now() + 1.0)
+        assert link.counters() == {"link_losses": 2, "dropped": 0, "refusals": 6}
+        assert link.health()["refusals"] == 6
 
 
 phases = st.lists(
@@ -367,7 +390,8 @@ def test_whatever_the_link_goes_through_the_robot_moves_only_for_a_young_command
                     assert last_command_s > up_since_s
             up_since_s = math.inf if link.up_since_s is None else link.up_since_s
     assert driven.guard.unsent == link.dropped
-    assert driven.stats.sent == sum(ticks for _, _, ticks in phases)
+    assert driven.stats.unsent == link.dropped
+    assert driven.stats.sent + driven.stats.unsent == sum(ticks for _, _, ticks in phases)
 
 
 class Adapter:
