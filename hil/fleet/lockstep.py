@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hil.fleet.clock import SimulatedClock
+from hil.fleet.clock import AnsweringClock, SimulatedClock
 from hil.fleet.direct import DirectLink
 from hil.fleet.rig import LIMITS, SAMPLE_PERIOD_S, RobotReport, RunResult, RunSettings, Wire, seeds_of
 from hil.plants.mecanum import MecanumPlant
@@ -175,12 +175,13 @@ def _wired(wire: Wire, plant: MecanumPlant, clock: SimulatedClock) -> tuple[Moti
         vehicle = MavlinkVehicle(COPTER, plant, theirs, is_guided=True, is_armed=True)
         return vehicle.controller, _mavlink_link(vehicle, ours, clock)
     controller = MotionController(plant)
-    return controller, _can_link(controller) if wire == "can" else _direct_link(controller, clock)
+    return controller, _can_link(controller, clock) if wire == "can" else _direct_link(controller, clock)
 
 
-def _can_link(controller: MotionController) -> _Link:
+def _can_link(controller: MotionController, clock: SimulatedClock) -> _Link:
     ours, theirs = can_line()
-    node, transport = CanMotionController(controller, theirs), RoboMasterCan(ours)
+    node = CanMotionController(controller, theirs)
+    transport = RoboMasterCan(ours, clock=AnsweringClock(clock, node.poll))
 
     def faults() -> int:
         wrong = node.faults + node.ignored_messages + node.malformed_messages + node.bus_errors

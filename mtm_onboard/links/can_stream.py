@@ -3,9 +3,10 @@
 import errno
 import select
 import time
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from mtm_onboard.links.base import LinkBusyError
+from mtm_onboard.links.can_bus import Bus
 from mtm_onboard.links.duml import Message, Parser, encode, segment
 from mtm_onboard.protocol.errors import MtmError
 
@@ -17,26 +18,11 @@ _SHORTEST_TIMEOUT_S = 0.001
 _MOST_FRAMES_A_READ = 512  # so that a babbling bus cannot hold its reader for ever
 
 
-class Bus(Protocol):
-    """What is used of a python-can bus."""
-
-    def send(self, msg: "can.Message", timeout: float | None = None) -> None:
-        """Put one frame on the bus."""
-        ...
-
-    def recv(self, timeout: float | None = None) -> "can.Message | None":
-        """The next frame, None when there is none within `timeout` seconds."""
-        ...
-
-    def shutdown(self) -> None:
-        """Release the bus."""
-        ...
-
-
 class CanStream:
     """Writes messages under one 11-bit id of `bus` and reads those that arrive under another.
 
     Raises MtmError when python-can is missing. Writing from several threads needs a lock around whole messages.
+    `error_frames` counts what the bus's controller said of errors on it.
     """
 
     def __init__(self, bus: Bus, send_id: int, receive_id: int) -> None:
@@ -45,6 +31,7 @@ class CanStream:
         except ImportError:
             raise MtmError("python-can is not installed; install mtm[can] to reach a robot over CAN.") from None
         self.parser = Parser()
+        self.error_frames = 0
         self._bus = bus
         self._send_id = send_id
         self._receive_id = receive_id
@@ -78,11 +65,19 @@ class CanStream:
                 if frame is None:
                     if self._descriptor is None:
                         break
-                elif frame.arbitration_id == self._receive_id and not (frame.is_extended_id or frame.is_error_frame):
+                elif frame.is_error_frame:
+                    self.error_frames += 1
+                elif frame.arbitration_id == self._receive_id and not frame.is_extended_id:
                     data += frame.data
         except self._errors as error:
             raise MtmError(f"The CAN bus cannot be read ({error}); check the wiring and the robot's power.") from error
         return self.parser.feed(data)
+
+    @property
+    def adapter_answers(self) -> tuple[int, int]:
+        """How many frames the adapter said that it rejected, and that it took; zeros where it says nothing."""
+        answers = getattr(self._bus, "answers", None)
+        return (0, 0) if answers is None else (answers.rejected, answers.took)
 
     def shutdown(self) -> None:
         """Release the bus, also one that is gone."""

@@ -202,6 +202,7 @@ class ReconnectingLink(Link):
 
     def _reopen(self) -> None:
         link = None
+        self._next_try_s = math.inf  # not again from within, where a link that waits has its clock call whom it serves
         try:
             link = self._make()
             link.resume()

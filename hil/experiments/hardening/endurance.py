@@ -125,7 +125,7 @@ class _Robot:
         self._plant = MecanumPlant(calibrated_parameters(), seed)
         ours, theirs = can_line()
         self._node = CanMotionController(MotionController(self._plant), theirs)
-        self._link = ReconnectingLink(lambda: RoboMasterCan(ours), clock)
+        self._link = ReconnectingLink(lambda: RoboMasterCan(ours, clock=clock), clock)
         self._task = ERRANDS["orbit"](Route((0.0, 0.0), ()), seed)
         rate_hz = _SCHEME.rate_hz
         header = JournalHeader(

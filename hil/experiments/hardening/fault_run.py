@@ -185,7 +185,7 @@ def _once_at_a_time(service: Callable[[float], None]) -> Callable[[float], None]
 def _end(name: str, wire: FaultyWire, plant: MecanumPlant, clock: SimulatedClock) -> _End:
     if name == "can":
         node = CanMotionController(MotionController(plant, DEADMEN_S[name]), FaultyBus(wire, is_robot=True))
-        return _End(node.poll, lambda: RoboMasterCan(FaultyBus(wire, is_robot=False)))
+        return _End(node.poll, lambda: RoboMasterCan(FaultyBus(wire, is_robot=False), clock=clock))
     if name == "plaintext":
         server = PlaintextMotionController(MotionController(plant, DEADMEN_S[name]), [FaultyTextPort(wire)])
         return _End(server.poll, lambda: LineLink(FaultyText(wire)))

@@ -426,7 +426,7 @@ def test_a_vehicle_is_driven_over_udp_in_real_time():
     clock, ended = SystemClock(), threading.Event()
     began_s = clock.now()
 
-    def poll(_tick, now_s):
+    def poll(_tick, now_s, _late_s):
         vehicle.poll(now_s - began_s)
 
     far_end = threading.Thread(

@@ -416,7 +416,7 @@ class Adapter:
 
     def make(self) -> RoboMasterCan:
         path = "/dev/not-plugged-in" if self.port is None else self.port.path
-        return RoboMasterCan(interface="slcan", channel=path, sleep_after_open=0)
+        return RoboMasterCan(interface="slcan", channel=path, sleep_after_open=0, clock=self.clock)
 
     def _poll(self, now_s: float) -> None:
         if self.port is None:
