@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mtm_onboard.control.control import Control, Session
@@ -67,16 +67,21 @@ class Outcome:
     source: Source
     journal: Journal | None
     link_losses: int = 0
+    link_degradations: int = 0
+    link_counters: dict[str, int] = field(default_factory=dict)
 
     def summary(self) -> str:
         """All of it in one line."""
         guard, late_ms = self.guard, [1e3 * self.stats.lateness.quantile_s(part) for part in (0.5, 0.99)]
         kept = f", journal {self.journal.path}, {self.journal.lost} rows lost" if self.journal else ""
+        counted = [f"{name.replace('_', ' ')} {count}" for name, count in self.link_counters.items() if count]
         return (
-            f"{self.stats.sent} ticks sent, {self.stats.missed} missed, {self.stats.overruns} over their period, "
+            f"{self.stats.sent} ticks sent, {self.stats.unsent} unsent, {self.stats.missed} missed, "
+            f"{self.stats.overruns} over their period, "
             f"{guard.clamped} clamped, {guard.stale} stale, {self.link_losses} link losses, "
-            f"{self.source.refused + guard.refused} commands refused, "
+            f"{self.link_degradations} times degraded, {self.source.refused + guard.refused} commands refused, "
             f"late p50 {late_ms[0]:.3f} ms p99 {late_ms[1]:.3f} ms{kept}"
+            + (f"; the link counted: {', '.join(counted)}" if counted else "")
         )
 
 
@@ -105,6 +110,8 @@ def run_session(
         files = stack.enter_context(ExitStack())
         socket = None if config.control is None else files.enter_context(ControlSocket(Path(config.control.socket)))
         stack.enter_context(transport)
+        if transport.degraded:
+            _warn(f"the link is degraded: {transport.degraded}")
         service = stack.enter_context(ServiceThread(transport, clock))
         # Before the service's thread is waited for, which a wedged driver may hold.
         stack.callback(transport.stop)
@@ -140,12 +147,12 @@ def run_session(
             manager.feed(now_s)
             return asked_to_end() or service.error is not None or now_s >= start_s + plan.duration_s
 
-        with _long_lived_objects_uncollected(), realtime(config.realtime, _warn):
+        with _long_lived_objects_uncollected(), realtime(config.realtime, _warn, service.thread):
             manager.ready()
             run_loop(clock, rate_hz, runtime.step, start_s=start_s, stop=ending, stats=stats)
         if service.error is not None:
             raise MtmError(f"the robot's link failed ({service.error}); check the link") from service.error
-    return Outcome(stats, guard, source, journal, runtime.link_losses)
+    return Outcome(stats, guard, source, journal, runtime.link_losses, runtime.link_degradations, transport.counters())
 
 
 def _warn(text: str) -> None:

@@ -1,19 +1,29 @@
-"""The loop's thread made a real-time one: before other programs, on a processor of its own, with its memory at hand."""
+"""The threads of a run made real-time ones: before other programs, in their order, with their memory at hand."""
 
 import ctypes
 import os
+import sys
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 
 from mtm_onboard.runtime.config import RealtimeSettings
 
 # From <sys/mman.h> of Linux.
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
+# How long a thread that computes may keep the interpreter from the loop; ten times less than usual.
+_SWITCH_INTERVAL_S = 0.0005
 
 
 @contextmanager
-def realtime(settings: RealtimeSettings, warn: Callable[[str], None]) -> Iterator[None]:
+def realtime(
+    settings: RealtimeSettings, warn: Callable[[str], None], heartbeat: threading.Thread | None = None
+) -> Iterator[None]:
     """Have the calling thread run as `settings` ask, and as before after the block; locked memory is the process's.
+
+    The thread `heartbeat`, which serves the link, runs one priority below and the process's other threads two below,
+    but not under 1. One that stayed below other programs would be made to wait by them while it holds a lock, or the
+    interpreter, that the loop is waiting for. The choice of a processor is the calling thread's alone.
 
     What the system refuses is left as it was, and `warn` is told once, in a sentence that says what to do about it.
     """
@@ -21,7 +31,7 @@ def realtime(settings: RealtimeSettings, warn: Callable[[str], None]) -> Iterato
     with ExitStack() as undo:
         for apply in (_lock_memory, _pin, _schedule):
             try:
-                apply(settings, undo)
+                apply(settings, undo, heartbeat)
             except OSError as error:
                 refused.append(_REMEDIES[apply].format(settings=settings, reason=error.strerror))
             except AttributeError:
@@ -31,16 +41,31 @@ def realtime(settings: RealtimeSettings, warn: Callable[[str], None]) -> Iterato
         yield
 
 
-def _schedule(settings: RealtimeSettings, undo: ExitStack) -> None:
-    if settings.priority is None:
+def _schedule(settings: RealtimeSettings, undo: ExitStack, heartbeat: threading.Thread | None) -> None:
+    priority = settings.priority
+    if priority is None:
         return
-    # Zero is the calling thread, not the process.
-    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
-    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(settings.priority))
-    undo.callback(os.sched_setscheduler, 0, policy, parameters)
+    _place(0, priority, undo)  # zero is the calling thread, not the process
+    for thread in threading.enumerate():
+        if thread is not threading.current_thread() and thread.native_id is not None:
+            with suppress(ProcessLookupError):  # it has just ended
+                _place(thread.native_id, max(1, priority - (1 if thread is heartbeat else 2)), undo)
+    undo.callback(sys.setswitchinterval, sys.getswitchinterval())
+    sys.setswitchinterval(_SWITCH_INTERVAL_S)
 
 
-def _pin(settings: RealtimeSettings, undo: ExitStack) -> None:
+def _place(thread: int, priority: int, undo: ExitStack) -> None:
+    policy, parameters = os.sched_getscheduler(thread), os.sched_getparam(thread)
+    os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+
+    def take_back() -> None:
+        with suppress(ProcessLookupError):
+            os.sched_setscheduler(thread, policy, parameters)
+
+    undo.callback(take_back)
+
+
+def _pin(settings: RealtimeSettings, undo: ExitStack, _: threading.Thread | None) -> None:
     if settings.cpu is None:
         return
     before = os.sched_getaffinity(0)
@@ -48,7 +73,7 @@ def _pin(settings: RealtimeSettings, undo: ExitStack) -> None:
     undo.callback(os.sched_setaffinity, 0, before)
 
 
-def _lock_memory(settings: RealtimeSettings, undo: ExitStack) -> None:
+def _lock_memory(settings: RealtimeSettings, undo: ExitStack, _: threading.Thread | None) -> None:
     if not settings.lock_memory:
         return
     libc = ctypes.CDLL(None, use_errno=True)

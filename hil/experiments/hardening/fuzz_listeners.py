@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hil.experiments.hardening.fuzz_traffic import signing_time
-from hil.fleet.clock import SimulatedClock
+from hil.fleet.clock import AnsweringClock, SimulatedClock
 from hil.plants.mecanum import MecanumPlant, calibrated_parameters
 from hil.vehicles.can_node import CanMotionController
 from hil.vehicles.mavlink_firmware import COPTER
@@ -66,10 +66,13 @@ class HearingNode(CanMotionController):
 
 
 class HearingCan(RoboMasterCan):
-    """The transport on the CAN bus."""
+    """The link on the CAN bus, which is opened with a willing robot at `far_end`."""
 
-    def __init__(self, bus: LineEnd, hears: Hears) -> None:
-        super().__init__(bus)
+    def __init__(self, bus: LineEnd, far_end: LineEnd, hears: Hears) -> None:
+        robot = CanMotionController(idle_controller(), far_end)
+        super().__init__(bus, clock=AnsweringClock(SimulatedClock(), robot.poll))
+        self._hears: Hears = lambda _: None
+        self.open()
         self._hears = hears
 
     @property

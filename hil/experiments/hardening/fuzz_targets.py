@@ -152,8 +152,7 @@ class CanLink(_Can):
     def __init__(self) -> None:
         feeder, end = can_line()
         super().__init__(can_from_robot(), feeder)
-        self._link = HearingCan(end, self.heard.append)
-        self._link.open()
+        self._link = HearingCan(end, feeder, self.heard.append)
 
     @property
     def failed_checks(self) -> int:

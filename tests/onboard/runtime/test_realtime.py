@@ -1,4 +1,5 @@
 import os
+import sys
 import threading
 import tomllib
 from pathlib import Path
@@ -45,6 +46,47 @@ def test_what_is_asked_for_is_in_force_in_the_block_and_taken_back_after_it(syst
         assert system == ["locked", {1}, (os.SCHED_FIFO, 40)]
         system.clear()
     assert system == [(os.SCHED_OTHER, 0), {0, 1, 2}, "unlocked"]
+
+
+def test_every_thread_of_a_run_has_its_place_below_the_loop():
+    placed, ended = threading.Barrier(3), threading.Event()
+
+    def wait() -> None:
+        placed.wait(10.0)
+        ended.wait(10.0)
+
+    heartbeat, other = threading.Thread(target=wait), threading.Thread(target=wait)
+    heartbeat.start()
+    other.start()
+    placed.wait(10.0)
+    switches_s, warnings = sys.getswitchinterval(), []
+    try:
+        with realtime(RealtimeSettings(priority=10), warnings.append, heartbeat):
+            if warnings:
+                pytest.skip("this system grants no real-time priority")
+            places = [place(thread) for thread in (threading.main_thread(), heartbeat, other)]
+            assert places == [(os.SCHED_FIFO, 10), (os.SCHED_FIFO, 9), (os.SCHED_FIFO, 8)]
+            assert sys.getswitchinterval() < switches_s
+        assert {place(thread) for thread in (threading.main_thread(), heartbeat, other)} == {(os.SCHED_OTHER, 0)}
+        assert sys.getswitchinterval() == switches_s
+    finally:
+        ended.set()
+        heartbeat.join()
+        other.join()
+
+
+def place(thread: threading.Thread) -> tuple[int, int]:
+    return os.sched_getscheduler(thread.native_id), os.sched_getparam(thread.native_id).sched_priority
+
+
+def test_the_lowest_priority_is_everybody_s(system):
+    ended = threading.Event()
+    thread = threading.Thread(target=ended.wait)
+    thread.start()
+    with realtime(RealtimeSettings(priority=1), pytest.fail, thread):
+        assert system == [(os.SCHED_FIFO, 1)] * 2
+    ended.set()
+    thread.join()
 
 
 def test_it_is_taken_back_when_the_block_fails(system):
