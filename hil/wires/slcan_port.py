@@ -66,6 +66,11 @@ class SlcanPort:
             self._pump()
         return self._received.popleft() if self._received else None
 
+    @property
+    def descriptor(self) -> int:
+        """The simulator's end, readable when the other side has sent something; frames may wait here nevertheless."""
+        return self._ours
+
     def shutdown(self) -> None:
         """Close the line; safe to call more than once."""
         if not self._is_shut_down:

@@ -105,6 +105,8 @@ def run_session(
     transport = _link(config, clock) if ends is None else ends.transport
     # The stack closes in reverse: the robot is told to stop before a socket or a slow disk is waited for.
     with ExitStack() as stack:
+        # From the start, so that no heartbeat is late while the rest is made.
+        place_threads = stack.enter_context(realtime(config.realtime, _warn))
         source = _source(config.source) if ends is None else ends.source
         stack.callback(source.close)
         files = stack.enter_context(ExitStack())
@@ -147,7 +149,8 @@ def run_session(
             manager.feed(now_s)
             return asked_to_end() or service.error is not None or now_s >= start_s + plan.duration_s
 
-        with _long_lived_objects_uncollected(), realtime(config.realtime, _warn, service.thread):
+        with _long_lived_objects_uncollected():
+            place_threads(service.thread)
             manager.ready()
             run_loop(clock, rate_hz, runtime.step, start_s=start_s, stop=ending, stats=stats)
         if service.error is not None:

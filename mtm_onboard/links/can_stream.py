@@ -38,6 +38,7 @@ class CanStream:
         self._frame = can.Message
         self._errors = (can.CanError, OSError, ValueError)  # ValueError: the descriptor of a closed bus
         self._descriptor = _descriptor(bus)
+        self._reads_ahead = hasattr(bus, "has_waiting")
 
     def write(self, message: Message, within_s: float = _WRITE_WITHIN_S) -> None:
         """Put one message on the bus, in `within_s` seconds at most.
@@ -102,11 +103,13 @@ class CanStream:
         self._bus.send(frame, timeout=0)
 
     def _is_quiet(self) -> bool:
-        """Whether nothing waits behind the bus's file descriptor; False when it has none.
+        """Whether nothing waits behind the bus's file descriptor, nor in the bus; False when it has no descriptor.
 
         A serial adapter's `recv(0)` waits a millisecond when there is nothing, and gives None for an adapter's own
         reply although frames wait behind it. The descriptor knows better.
         """
+        if self._reads_ahead and self._bus.has_waiting:  # type: ignore[attr-defined]
+            return False
         return self._descriptor is not None and not select.select([self._descriptor], (), (), 0)[0]
 
 

@@ -17,13 +17,14 @@ _SWITCH_INTERVAL_S = 0.0005
 
 @contextmanager
 def realtime(
-    settings: RealtimeSettings, warn: Callable[[str], None], heartbeat: threading.Thread | None = None
-) -> Iterator[None]:
+    settings: RealtimeSettings, warn: Callable[[str], None]
+) -> Iterator[Callable[[threading.Thread | None], None]]:
     """Have the calling thread run as `settings` ask, and as before after the block; locked memory is the process's.
 
-    The thread `heartbeat`, which serves the link, runs one priority below and the process's other threads two below,
-    but not under 1. One that stayed below other programs would be made to wait by them while it holds a lock, or the
-    interpreter, that the loop is waiting for. The choice of a processor is the calling thread's alone.
+    The block is given a function that puts the process's other threads in their places, to be called when they have
+    begun: the thread it is given, which serves the link, runs one priority below the calling one and all others two
+    below, but not under 1. One that stayed below other programs would be made to wait by them while it holds a lock, or
+    the interpreter, that the loop is waiting for. The choice of a processor is the calling thread's alone.
 
     What the system refuses is left as it was, and `warn` is told once, in a sentence that says what to do about it.
     """
@@ -31,25 +32,30 @@ def realtime(
     with ExitStack() as undo:
         for apply in (_lock_memory, _pin, _schedule):
             try:
-                apply(settings, undo, heartbeat)
+                apply(settings, undo)
             except OSError as error:
                 refused.append(_REMEDIES[apply].format(settings=settings, reason=error.strerror))
             except AttributeError:
                 refused.append(f"this system has no {_NAMES[apply]}, so leave it out")
         if refused:
             warn(f"[realtime] is not wholly in force: {'; '.join(refused)}")
-        yield
+        is_placed = settings.priority is not None and not any("priority" in text for text in refused)
+        own = threading.current_thread()
+
+        def place(heartbeat: threading.Thread | None) -> None:
+            for thread in threading.enumerate() if is_placed else ():
+                if thread is not own and thread.native_id is not None:
+                    below = 1 if thread is heartbeat else 2
+                    with suppress(ProcessLookupError):  # it has just ended
+                        _place(thread.native_id, max(1, (settings.priority or 0) - below), undo)
+
+        yield place
 
 
-def _schedule(settings: RealtimeSettings, undo: ExitStack, heartbeat: threading.Thread | None) -> None:
-    priority = settings.priority
-    if priority is None:
+def _schedule(settings: RealtimeSettings, undo: ExitStack) -> None:
+    if settings.priority is None:
         return
-    _place(0, priority, undo)  # zero is the calling thread, not the process
-    for thread in threading.enumerate():
-        if thread is not threading.current_thread() and thread.native_id is not None:
-            with suppress(ProcessLookupError):  # it has just ended
-                _place(thread.native_id, max(1, priority - (1 if thread is heartbeat else 2)), undo)
+    _place(0, settings.priority, undo)  # zero is the calling thread, not the process
     undo.callback(sys.setswitchinterval, sys.getswitchinterval())
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
 
@@ -65,7 +71,7 @@ def _place(thread: int, priority: int, undo: ExitStack) -> None:
     undo.callback(take_back)
 
 
-def _pin(settings: RealtimeSettings, undo: ExitStack, _: threading.Thread | None) -> None:
+def _pin(settings: RealtimeSettings, undo: ExitStack) -> None:
     if settings.cpu is None:
         return
     before = os.sched_getaffinity(0)
@@ -73,7 +79,7 @@ def _pin(settings: RealtimeSettings, undo: ExitStack, _: threading.Thread | None
     undo.callback(os.sched_setaffinity, 0, before)
 
 
-def _lock_memory(settings: RealtimeSettings, undo: ExitStack, _: threading.Thread | None) -> None:
+def _lock_memory(settings: RealtimeSettings, undo: ExitStack) -> None:
     if not settings.lock_memory:
         return
     libc = ctypes.CDLL(None, use_errno=True)
