@@ -215,20 +215,22 @@ typedef struct {
 /* What the gateway does with the companion's stream (CAN id 0x201). A speed command is set 3F, id 21, 12 bytes of
  * payload, not an acknowledgement, not encrypted.
  *
- * - Every frame leaves as it came, in order, as soon as it is whole: one frame time of delay, plus the poll. Only the
- *   payload and CRC16 of speed commands change. A value that shares its first byte with the frame before keeps that
- *   byte (the lowest of the mantissa), at a cost of 2^-17 of the value at most; where two or three bytes would be
- *   left behind, which happens only to senders that pack messages without aligning them, the frame waits for the next.
+ * - Every frame leaves as it came, those of an id in order, as soon as it is whole: one frame time of delay, plus the
+ *   poll. Only the payload and CRC16 of speed commands change. A value that shares its first byte with the frame before
+ *   keeps that byte (the lowest of the mantissa), at a cost of 2^-17 of the value at most; where two or three bytes would
+ *   be left behind, which happens only to senders that pack messages without aligning them, the frame waits for the next.
  * - A command to which nothing is added and nothing limited leaves bit for bit as it came.
  * - A command whose CRC16 is wrong leaves with an equally wrong one and counts for nothing. A command that holds a
  *   NaN or an infinity leaves with the last good values in their place, fading as any stale command does.
  * - When commands stay away for hold_ms, or stop is latched, the gateway sends speed commands itself, one each tick:
- *   fading, then zero, until the companion's next; between two of its messages, or after 20 ms of waiting for the end
- *   of one, inside it (the robot then loses that message). Not before the first speed command, nor after wheel speed
- *   (3F/20), follow speed (3F/22), position move (3F/25) or work mode 0 (3F/19), unless stop is latched.
+ *   fading, then zero, until the companion's next; between two of its messages. Where a frame holds the end of one and
+ *   the beginning of another, the beginning waits meanwhile, in a frame of its own, for the frame after it. Only when a
+ *   message has begun to leave and does not end within 20 ms is it cut into; the robot then loses it. Not before the
+ *   first speed command, nor after wheel speed (3F/20), follow speed (3F/22), position move (3F/25) or work mode 0
+ *   (3F/19), unless stop is latched.
  * - While stop is latched the three other motion commands leave with a spoilt CRC16, so that the robot ignores them.
  * - `fill`: send base and noise each tick, between the companion's own messages, so that the waveform keeps its
- *   time when the companion does not. It finds room only with senders that begin each message in a frame of its own.
+ *   time when the companion does not.
  * The controller's frames pass untouched. */
 typedef struct {
     uint32_t rewritten; /* speed commands that left with other values */
@@ -250,7 +252,7 @@ typedef struct {
     mtm_duml_head head; /* of the last speed command */
     mtm_velocity arriving;
     uint32_t last_tick, due_us;
-    uint8_t queued, ready, gone, held_from, reverse_full, rewriting, changed, armed, fill, due;
+    uint8_t queued, ready, gone, held_from, holds_head, reverse_full, rewriting, changed, armed, fill, due;
 } mtm_gateway;
 
 /* `shim` and `board` must outlive the gateway; the shim is ticked by the gateway alone. */
