@@ -145,7 +145,13 @@ void mtm_shim_silence(mtm_shim *shim);
  *   below hold_ms     base + noise
  *   below zero_ms     base, fading linearly to zero; no noise
  *   zero_ms and more  zero
- * While stopped: zero. Constant memory, no division by a number that may be zero, every loop bounded. */
+ * While stopped: zero. Constant memory, no division by a number that may be zero, every loop bounded.
+ *
+ * The guard of the companion's program (mtm_onboard/runtime/guard.py) ages and fades commands alike and refuses what
+ * is not finite alike, and differs in its limits: it bounds the norm of (vx, vy), where here each axis is bounded by
+ * itself and the norm may reach sqrt(2) times the limit; it shortens the noise along its direction, where here the
+ * sum of base and noise is cut axis by axis; it bounds the noise in multiples of sigma, where here the image does,
+ * and the change of (vx, vy) from tick to tick, which here nothing does; and its stop cannot be released. */
 void mtm_shim_tick(mtm_shim *shim, uint32_t now_us, const mtm_velocity *base, mtm_velocity *out);
 
 /* Operator stop: output is zero from the next tick on, until mtm_shim_release and then a new command. The message's
@@ -216,9 +222,10 @@ typedef struct {
  * payload, not an acknowledgement, not encrypted.
  *
  * - Every frame leaves as it came, those of an id in order, as soon as it is whole: one frame time of delay, plus the
- *   poll. Only the payload and CRC16 of speed commands change. A value that shares its first byte with the frame before
- *   keeps that byte (the lowest of the mantissa), at a cost of 2^-17 of the value at most; where two or three bytes would
- *   be left behind, which happens only to senders that pack messages without aligning them, the frame waits for the next.
+ *   poll. Only the payload and CRC16 of speed commands change. A value that shares its first byte with the frame
+ *   before keeps that byte (the lowest of the mantissa), at a cost of 2^-17 of the value at most; where two or three
+ *   bytes would be left behind, which happens only to senders that pack messages without aligning them, the frame
+ *   waits for the next.
  * - A command to which nothing is added and nothing limited leaves bit for bit as it came.
  * - A command whose CRC16 is wrong leaves with an equally wrong one and counts for nothing. A command that holds a
  *   NaN or an infinity leaves with the last good values in their place, fading as any stale command does.

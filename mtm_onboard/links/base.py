@@ -9,7 +9,12 @@ from mtm_onboard.protocol.errors import MtmError
 
 
 class LinkBusyError(MtmError):
-    """The far end took a command not at all, or not whole, within the write bound; the link may still be sound."""
+    """The far end took a command not at all, or not whole, within the write bound; the link may still be sound.
+
+    `has_begun` says of a command in a stream that its first bytes have left and the others will, before the next one.
+    """
+
+    has_begun: bool = False
 
 
 class TakenOverError(MtmError):

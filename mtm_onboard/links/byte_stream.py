@@ -49,6 +49,9 @@ class ByteStream:
         before = self.sent_bytes
         try:
             self._flush(deadline_s)
+        except LinkBusyError as error:
+            error.has_begun = self.sent_bytes - before > owed
+            raise
         finally:
             if self.sent_bytes - before <= owed:
                 del self._unsent[owed - (self.sent_bytes - before) :]

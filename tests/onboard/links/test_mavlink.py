@@ -263,6 +263,9 @@ def test_a_vehicle_that_falls_silent_is_not_driven_on():
         rig.drive(FORWARD)
         rig.vehicle._port.is_cut = True
         began_s = rig.clock.now()
+        assert rig.transport.degraded == ""
+        rig.drive(FORWARD, 2.0)
+        assert rig.transport.degraded == "the vehicle's heartbeat is late"
         with pytest.raises(MtmError, match="last heard 3.5 s ago"):
             rig.drive(FORWARD, 10.0)
         assert 2.4 < rig.clock.now() - began_s < 3.6

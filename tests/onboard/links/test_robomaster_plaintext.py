@@ -5,6 +5,7 @@ import socket
 import threading
 import time
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -415,3 +416,35 @@ def test_the_example_configuration_s_alternatives_make_a_link(kind, kept):
 def test_options_that_a_link_does_not_take_are_one_sentence(kind, options):
     with pytest.raises(MtmError, match=r"correct \[transport\]"):
         make_link(kind, options)
+
+
+def test_what_was_sent_is_what_arrives_on_a_line_that_fills(line):
+    transport, far = line
+    transport.open()
+    data, sent = b"", 0
+    for number in range(4000):
+        try:
+            transport.send(BodyVelocity(0.0001 * (number % 1000), 0.0, 0.0))
+            sent += 1
+        except LinkBusyError:
+            data += arrived(far)
+        vars(transport)["_answered"] = vars(transport)["_sent"]  # as if the robot had answered
+    transport.stop()
+    far.setblocking(False)
+    with suppress(BlockingIOError):
+        while part := far.recv(1_000_000):
+            data += part
+    assert sent < 4000
+    assert data.removeprefix(OPENING).removesuffix(RELEASE).count(b";") == sent
+
+
+def test_a_robot_that_falls_behind_is_doubted_before_it_is_lost(line):
+    transport, far = line
+    transport.open()
+    for _ in range(12):
+        transport.send(FORWARD)
+    transport.service(0.0)
+    assert transport.degraded == "the robot does not answer its commands"
+    far.send(b"ok seq 15;")
+    transport.service(0.1)
+    assert transport.degraded == ""
