@@ -222,7 +222,7 @@ def test_a_topic_the_robot_does_not_know_is_named_and_the_others_are_pushed(node
     assert len(bus.answers[-1].payload) == 2 + 8 + 12 + 12
 
 
-def test_a_published_subscription_to_seven_topics_is_pushed_where_its_client_looks(node, bus):
+def test_seven_published_topics_are_pushed_where_the_client_looks(node, bus):
     bus.put(
         bytes.fromhex(
             "554c046c090302004048030901030007a702298803000200663e3e4c03000200fbdcf5d70300020009a326e203000200"
