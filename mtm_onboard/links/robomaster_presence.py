@@ -7,7 +7,7 @@ from mtm_onboard.links.duml import Message
 from mtm_onboard.links.robomaster_messages import WORK_MODE
 
 ANSWER_WITHIN_S: Final = 1.0
-ASK_AGAIN_S: Final = 0.25
+ASK_AGAIN_S: Final = 0.1
 # A dozen pushes of telemetry at 50 Hz.
 QUIET_S: Final = 0.25
 LOST_S: Final = 1.0
