@@ -24,11 +24,12 @@ LEVELS = {
     ),
     "mtm_audit": (
         "model", "readers", "tracking", "ingest", "detectors", "significance", "decoding", "reporting", "planning",
-        "commands", "cli",
+        "commands", "cli", "__main__",
     ),
     "hil": (
         "plants", "wires", "vehicles", "sensors", "worlds", "fleet", "experiments.runs", "experiments.detectors",
         "experiments.worlds", "experiments.messages", "experiments.hardening", "experiments", "commands", "cli",
+        "__main__",
     ),
 }  # fmt: skip
 

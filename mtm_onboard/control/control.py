@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mtm_onboard.journal.journal import Journal
-from mtm_onboard.links.base import Transport
+from mtm_onboard.links.base import Link
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.runtime.guard import Guard
 from mtm_onboard.runtime.loop import LoopStats
@@ -41,7 +41,7 @@ class Session:
     modulator: Modulator
     guard: Guard
     source: Source
-    transport: Transport
+    transport: Link
     stats: LoopStats
     journal: Journal | None
     tick: Callable[[], int]
@@ -109,12 +109,12 @@ class Control:
             "scheme": session.key.scheme.fingerprint,
             "tick": tick,
             "sent": stats.sent,
+            "unsent": stats.unsent,
             "missed": stats.missed,
             "overruns": stats.overruns,
             "clamped": guard.clamped,
             "stale": guard.stale,
             "held": guard.held,
-            "unsent": guard.unsent,
             "refused": session.source.refused + guard.refused,
             "late_p99_ms": round(1e3 * stats.lateness.quantile_s(0.99), 3),
             "stopped": guard.stopped,

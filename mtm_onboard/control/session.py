@@ -6,16 +6,16 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mtm_onboard.control.control import Control, Session
 from mtm_onboard.control.control_socket import ControlSocket
 from mtm_onboard.control.service_manager import ServiceManager
 from mtm_onboard.journal.journal import Journal, JournalHeader
-from mtm_onboard.links.base import Transport
-from mtm_onboard.links.factory import make_transport
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.base import Link
+from mtm_onboard.links.factory import make_link
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.model.clock import Clock, SystemClock
 from mtm_onboard.protocol import Key, MtmError, Scheme
 from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
@@ -55,10 +55,10 @@ class Ends:
     """Where base commands come from and where commands go, when the caller has both already."""
 
     source: Source
-    transport: Transport
+    transport: Link
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
     """What the run did. `journal` is None when none was kept."""
 
@@ -67,16 +67,21 @@ class Outcome:
     source: Source
     journal: Journal | None
     link_losses: int = 0
+    link_degradations: int = 0
+    link_counters: dict[str, int] = field(default_factory=dict)
 
     def summary(self) -> str:
         """All of it in one line."""
         guard, late_ms = self.guard, [1e3 * self.stats.lateness.quantile_s(part) for part in (0.5, 0.99)]
         kept = f", journal {self.journal.path}, {self.journal.lost} rows lost" if self.journal else ""
+        counted = [f"{name.replace('_', ' ')} {count}" for name, count in self.link_counters.items() if count]
         return (
-            f"{self.stats.sent} ticks sent, {self.stats.missed} missed, {self.stats.overruns} over their period, "
+            f"{self.stats.sent} ticks sent, {self.stats.unsent} unsent, {self.stats.missed} missed, "
+            f"{self.stats.overruns} over their period, "
             f"{guard.clamped} clamped, {guard.stale} stale, {self.link_losses} link losses, "
-            f"{self.source.refused + guard.refused} commands refused, "
+            f"{self.link_degradations} times degraded, {self.source.refused + guard.refused} commands refused, "
             f"late p50 {late_ms[0]:.3f} ms p99 {late_ms[1]:.3f} ms{kept}"
+            + (f"; the link counted: {', '.join(counted)}" if counted else "")
         )
 
 
@@ -100,11 +105,15 @@ def run_session(
     transport = _link(config, clock) if ends is None else ends.transport
     # The stack closes in reverse: the robot is told to stop before a socket or a slow disk is waited for.
     with ExitStack() as stack:
+        # From the start, so that no heartbeat is late while the rest is made.
+        place_threads = stack.enter_context(realtime(config.realtime, _warn))
         source = _source(config.source) if ends is None else ends.source
         stack.callback(source.close)
         files = stack.enter_context(ExitStack())
         socket = None if config.control is None else files.enter_context(ControlSocket(Path(config.control.socket)))
         stack.enter_context(transport)
+        if transport.degraded:
+            _warn(f"the link is degraded: {transport.degraded}")
         service = stack.enter_context(ServiceThread(transport, clock))
         # Before the service's thread is waited for, which a wedged driver may hold.
         stack.callback(transport.stop)
@@ -149,23 +158,32 @@ def run_session(
             manager.feed(now_s)
             return asked_to_end() or service.error is not None or now_s >= start_s + plan.duration_s
 
-        with _long_lived_objects_uncollected(), realtime(config.realtime, _warn):
+        with _long_lived_objects_uncollected():
+            place_threads(service.thread)
             manager.ready()
             run_loop(clock, rate_hz, runtime.step, start_s=start_s, stop=ending, stats=stats)
         if service.error is not None:
             raise MtmError(f"the robot's link failed ({service.error}); check the link") from service.error
-    return Outcome(stats, guard, source, journal, runtime.transport_errors)
+    return Outcome(
+        stats=stats,
+        guard=guard,
+        source=source,
+        journal=journal,
+        link_losses=runtime.link_losses,
+        link_degradations=runtime.link_degradations,
+        link_counters=transport.counters(),
+    )
 
 
 def _warn(text: str) -> None:
     print(f"mtm-onboard: {text}", file=sys.stderr)
 
 
-def _link(config: RobotConfig, clock: Clock) -> Transport:
-    def make() -> Transport:
-        return make_transport(config.transport_kind, config.transport_options)
+def _link(config: RobotConfig, clock: Clock) -> Link:
+    def make() -> Link:
+        return make_link(config.transport_kind, config.transport_options)
 
-    return ReconnectingTransport(make, clock, give_up_s=config.link.give_up_s) if config.link.reconnect else make()
+    return ReconnectingLink(make, clock, give_up_s=config.link.give_up_s) if config.link.reconnect else make()
 
 
 def start_of(plan: Plan, scheme: Scheme, now_unix_s: float) -> tuple[float, int]:

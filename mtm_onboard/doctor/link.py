@@ -11,7 +11,7 @@ from importlib.util import find_spec
 
 from mtm_onboard.doctor.can_interface import check_interface
 from mtm_onboard.doctor.finding import Finding
-from mtm_onboard.links.factory import make_transport
+from mtm_onboard.links.factory import make_link
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.installing import install_command
 from mtm_onboard.runtime.config import Option
@@ -27,7 +27,7 @@ _VIRTUAL_CAN = ("virtual", "udp_multicast")
 def check_link(kind: str, options: Options) -> Finding:
     """Check what this kind of transport needs; the options are checked by making the transport without opening it."""
     try:
-        make_transport(kind, options)
+        make_link(kind, options)
         return _CHECKS[kind](options)
     except MtmError as error:
         return Finding("link", "fail", str(error))

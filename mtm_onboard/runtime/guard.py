@@ -1,6 +1,12 @@
 """The guard: what may be sent. When anything is wrong the noise goes first and the base command stays.
 
 Motion itself stops only when the base command is stale or the operator says stop.
+
+The guard of the microcontroller (`firmware_shim`, `mtm_shim.h`) ages and fades base commands alike and refuses what is
+not finite alike, and differs in these limits: it bounds each axis by itself, so that (vx, vy) may reach the square root
+of two times a limit that here bounds their norm; it cuts the sum of base and noise axis by axis, where here the noise
+is shortened along its direction; the noise of an axis is bounded by the image; changes from tick to tick are not
+bounded; and its stop can be released.
 """
 
 import math

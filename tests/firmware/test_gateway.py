@@ -229,6 +229,80 @@ def test_stop_cuts_in_when_a_sender_is_always_inside_a_message():
     assert wire_speeds(messages[-1]) == (0.0, 0.0, 0.0)
 
 
+def heartbeat(number: int) -> bytes:
+    return built(9, 0xC3, number & 0xFFFF, 0, 0x3F, 0x60, bytes(14))
+
+
+class Packed:
+    """A sender that fills each frame before it begins the next, whatever message a byte is of."""
+
+    def __init__(self, board: Board) -> None:
+        self.board = board
+        self._rest = b""
+
+    def say(self, message: bytes) -> None:
+        data = self._rest + message
+        whole = len(data) // 8 * 8
+        self._rest = data[whole:]
+        self.board.pass_on(cut(data[:whole], 8))
+
+
+@pytest.mark.parametrize("fill", [False, True])
+def test_no_message_of_a_packed_sender_is_lost_while_the_gateway_speaks(fill):
+    board = playing(fill=fill)
+    sender = Packed(board)
+    sender.say(speed_message(0.5, 0.0, 0.0))
+    told = [heartbeat(number) for number in range(300)]
+    for message in told:
+        sender.say(message)
+        board.run(10_000 - 4 * 130, 790)
+    heard = whole_messages(board.sent[CONTROLLER])
+    assert [message for message in heard if message[10] == 0x60] == told[: len(told) - 1]
+    own = [message for message in heard if message[9:11] == b"\x3f\x21"]
+    # From 0.1 s on, or from the first one with fill, one each 20 ms for the three seconds.
+    assert len(own) >= (145 if fill else 140)
+    assert wire_speeds(own[-1]) == (0.0, 0.0, 0.0)
+
+
+def test_a_held_beginning_leaves_with_the_frame_after_it_and_in_order():
+    board = playing()
+    sender = Packed(board)
+    sender.say(speed_message(0.5, 0.0, 0.0))
+    board.run(300_000)
+    for number in range(20):
+        sender.say(heartbeat(number))
+        board.pass_on([Frame(0x7FF, bytes([number]))])
+        board.run(5_000)
+    others = [frame.data[0] for frame in board.sent[CONTROLLER] if frame.id == 0x7FF]
+    assert others == sorted(others)
+    sender.say(heartbeat(20))
+    board.run(1000)
+    heard = [message for message in whole_messages(board.sent[CONTROLLER]) if message[10] == 0x60]
+    assert heard == [heartbeat(number) for number in range(len(heard))]
+    assert len(heard) >= 20
+
+
+def test_a_held_beginning_holds_up_no_frame_of_another_id():
+    board = playing()
+    board.pass_on(aligned(speed_message(0.5, 0.0, 0.0)))
+    board.run(300_000)
+    frames = cut(heartbeat(0) + heartbeat(1), 8)
+    board.pass_on(frames[:4])  # the last of them holds the beginning of the second
+    for number in range(50):
+        frame = Frame(0x7FF, bytes([number]))
+        assert frame in board.pass_on([frame])
+        board.run(7_000)
+    board.pass_on(frames[4:])
+    heard = [message for message in whole_messages(board.sent[CONTROLLER]) if message[10] == 0x60]
+    assert heard == [heartbeat(0), heartbeat(1)]
+
+
+def test_a_packed_sender_s_frames_pass_uncut_while_its_commands_are_fresh():
+    board = silent()
+    frames = cut(speed_message(0.5, 0.0, 0.0) + heartbeat(0) + speed_message(0.5, 0.0, 0.0) + heartbeat(1), 8)
+    assert len(board.pass_on(frames)) == len(frames)
+
+
 def test_a_sender_that_falls_silent_inside_a_value_is_brought_to_rest():
     board = playing()
     board.pass_on(aligned(speed_message(0.5, 0.0, 0.0)))

@@ -163,7 +163,8 @@ def test_a_run_to_a_message_s_end_sends_it_and_says_so(tmp_path, key, capsys):
     configure(tmp_path)
     assert run(tmp_path, "--message", "99", "--duration", "0.1") == 0
     assert re.fullmatch(
-        r"\d+ ticks sent, \d+ missed, \d+ over their period, 0 clamped, \d+ stale, 0 link losses, 0 commands refused, "
+        r"\d+ ticks sent, 0 unsent, \d+ missed, \d+ over their period, 0 clamped, \d+ stale, 0 link losses, "
+        r"0 times degraded, 0 commands refused, "
         r"late p50 [\d.]+ ms p99 [\d.]+ ms, journal .*journal.csv, 0 rows lost\n",
         capsys.readouterr().out,
     )

@@ -30,7 +30,7 @@ from mtm_audit.detectors.base import Observation
 from mtm_audit.model.glimpse import glimpse_of_track
 from mtm_audit.significance.decoys import decoy_codebooks
 from mtm_onboard.journal.journal import DEFAULT_MAX_BYTES, Journal, JournalHeader
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.protocol import Channel, Key, MtmError, Scheme
 from mtm_onboard.protocol.journal_file import segments
@@ -130,7 +130,7 @@ class _Robot:
         self._plant = MecanumPlant(calibrated_parameters(), seed)
         ours, theirs = can_line()
         self._node = CanMotionController(MotionController(self._plant), theirs)
-        self._link = ReconnectingTransport(lambda: RoboMasterCan(ours), clock)
+        self._link = ReconnectingLink(lambda: RoboMasterCan(ours, clock=clock), clock)
         self._task = TASKS["orbit"](Route((0.0, 0.0), ()), seed)
         rate_hz = _SCHEME.rate_hz
         header = JournalHeader(
@@ -177,15 +177,15 @@ class _Robot:
         """The checkpoint without what is decoded from the film."""
         stats, guard, journal = self._stats, self._guard, self._journal
         return Checkpoint(
-            elapsed_s=self._clock.now(), ticks=stats.sent, missed=stats.missed, clamped=guard.clamped,
+            elapsed_s=self._clock.now(), ticks=stats.sent + stats.unsent, missed=stats.missed, clamped=guard.clamped,
             disturbed=guard.stale + guard.refused + guard.held + guard.unsent, faults=self._faults(),
             resident_bytes=_resident_bytes(), journal_lost=journal.lost,
             journal_bytes=sum(part.stat().st_size for part in segments(journal.path)), cpu_s=time.process_time(),
         )  # fmt: skip
 
-    def _step(self, tick: int, now_s: float) -> None:
+    def _step(self, tick: int, now_s: float, late_s: float) -> bool:
         self._source.set(self._task.command(self._plant.position_xy_m, self._plant.heading_rad), now_s)
-        self._runtime.step(tick, now_s)
+        return self._runtime.step(tick, now_s, late_s)
 
     def _poll(self, now_s: float) -> None:
         self._node.poll(now_s)

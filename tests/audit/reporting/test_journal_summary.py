@@ -8,8 +8,8 @@ from hil.fleet.clock import SimulatedClock
 from mtm_audit.cli import main
 from mtm_audit.reporting.journal_summary import injected_noise, summary_of
 from mtm_onboard.journal.journal import Journal
-from mtm_onboard.links.none import NullTransport
-from mtm_onboard.model.velocity import BodyVelocity
+from mtm_onboard.links.none import NullLink
+from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.journal_file import CLAMPED, NOISE, UNSENT, JournalHeader, read_journal
 from mtm_onboard.runtime.guard import Limits
@@ -37,7 +37,7 @@ def run(tmp_path):
     """Six seconds of a message, and then a second of stale commands."""
     clock = SimulatedClock()
     with Journal(tmp_path / "run.csv", HEADER, threaded=False) as journal:
-        driven = Driven(NullTransport(), clock, MESSAGE, Limits(1.0, 2.0, noise_sigmas=2.0), journal=journal)
+        driven = Driven(NullLink(), clock, MESSAGE, Limits(1.0, 2.0, noise_sigmas=2.0), journal=journal)
         driven.run(6.0, BASE)
         driven.run(1.0)
         driven.source.stop()
@@ -80,13 +80,14 @@ def test_in_a_missing_tick_the_noise_is_held_and_not_valid(tmp_path):
     with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
         for tick in (-2, -1, 0, 3, 4):
             sent = BodyVelocity(0.1 * tick, 0.0, 0.0)
-            journal.append(tick, tick / 50.0, BodyVelocity(0.0, 0.0, 0.0), sent, UNSENT if tick == -1 else NOISE)
+            journal.append(tick, tick / 50.0, STOP, sent, UNSENT if tick == -1 else NOISE, 0.0)
     record = read_journal(journal.path)
     truth = injected_noise(record)
     assert truth.edges_s == pytest.approx(1.7e9 + np.arange(-2, 6) / 50.0, abs=1e-6)
     assert truth.velocities[:, 0] == pytest.approx([-0.2, 0.0, 0.0, 0.0, 0.0, 0.3, 0.4])
     assert truth.valid.tolist() == [True, True, True, False, False, True, True]
     assert summary_of(record).missed == 2
+    assert summary_of(record).as_table()["ticks"] | {"sent": 4, "unsent": 1} == summary_of(record).as_table()["ticks"]
 
 
 def test_in_simulated_time_the_noise_counts_from_the_message_s_start(tmp_path):
@@ -102,7 +103,7 @@ def test_in_simulated_time_the_noise_counts_from_the_message_s_start(tmp_path):
         start_unix_s=None,
     )
     with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
-        journal.append(0, 100.0, BASE, BASE, CLAMPED)
+        journal.append(0, 100.0, BASE, BASE, CLAMPED, 0.0)
     assert injected_noise(read_journal(journal.path)).edges_s == pytest.approx([0.0, 0.02])
 
 
@@ -110,7 +111,7 @@ def test_in_simulated_time_the_noise_counts_from_the_message_s_start(tmp_path):
 def test_what_is_no_run_is_refused(tmp_path, ticks, sentence):
     with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
         for tick in ticks:
-            journal.append(tick, 0.0, BASE, BASE, 0)
+            journal.append(tick, 0.0, BASE, BASE, 0, 0.0)
     record = read_journal(journal.path)
     for ask in (summary_of, injected_noise):
         with pytest.raises(MtmError, match=sentence):

@@ -6,7 +6,7 @@ import pytest
 from mtm_audit.decoding.decode import DecodeSettings, decode_tracks
 from mtm_audit.reporting.journal_summary import injected_noise, summary_of
 from mtm_onboard.journal.journal import Journal
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol.journal_file import JournalHeader, read_journal
 from mtm_onboard.runtime.modulator import Modulator
@@ -36,7 +36,7 @@ def outage(tmp_path_factory):
     )
     poses = []
     with can_rig(LineRig, deadman_s=0.2) as rig, Journal(path, header, threaded=False) as journal:
-        link = ReconnectingTransport(rig.remake, rig.clock)
+        link = ReconnectingLink(rig.remake, rig.clock)
         rig.clock.every(link.service_period_s, link.service)
         rig.clock.every(0.01, lambda _: poses.append(rig.plant.position_xy_m))
         with link:

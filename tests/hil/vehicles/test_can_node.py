@@ -231,10 +231,49 @@ def test_the_end_of_a_subscription_ends_the_pushes(node, bus):
     assert bus.answers[-1].payload == b"\x00"
 
 
-@pytest.mark.parametrize(
-    "wanted", [subscribe(topics=(0x0002000326E2A309,)), subscribe(rate_hz=0), subscribe(rate_hz=201)]
-)
-def test_a_topic_or_rate_the_robot_cannot_serve_is_refused(node, bus, wanted):
+def test_a_topic_the_robot_does_not_know_is_named_and_the_others_are_pushed(node, bus):
+    tell(node, bus, subscribe(topics=(telemetry.POSITION, 0x0002000391A13D9C, telemetry.ATTITUDE)))
+    assert bus.answers[-1].payload == bytes.fromhex("00030004 9c3da191")
+    node.poll(0.02)
+    assert len(bus.answers[-1].payload) == 2 + 8 + 12 + 12
+
+
+def test_seven_published_topics_are_pushed_where_the_client_looks(node, bus):
+    bus.put(
+        bytes.fromhex(
+            "554c046c090302004048030901030007a702298803000200663e3e4c03000200fbdcf5d70300020009a326e203000200"
+            "f41d1cdc0300020042ee131d03000200b3f7e64703000200320035 76"
+        )
+    )
+    tell(node, bus, ENGAGE, FORWARD)
+    node.poll(0.02)
+    (push,) = [message for message in bus.answers if telemetry.PUSH.matches(message)]
+    message = encode(push)
+    assert len(message) == 155
+    # The client's offsets count from the attributes, the ninth byte.
+    body_mps = struct.unpack_from("<6f", message, 8 + 27)[3:]
+    rpm = struct.unpack_from("<4h", message, 8 + 61)
+    assert body_mps == pytest.approx((0.5, 0.0, 0.0))
+    assert rpm == (95, -95, -95, 95)
+    assert struct.unpack_from("<6f", message, 8 + 97)[2] == -1.0
+    assert struct.unpack_from("<H", message, 8 + 51)[0] > 11_000
+
+
+def test_a_node_that_is_reset_has_no_streams(node, bus):
+    tell(node, bus, subscribe(), telemetry.RESET_NODE.message(3, b"\x09"))
+    node.poll(0.1)
+    assert not [message for message in bus.answers if telemetry.PUSH.matches(message)]
+
+
+def test_a_robot_that_cannot_engage_says_so_and_stands_still(bus):
+    node = CanMotionController(MotionController(FloatingPlant()), bus, can_engage=False)
+    tell(node, bus, ENGAGE, FORWARD)
+    assert bus.answers == [Message(0xC3, 0x09, 0, 0x80, 0x3F, 0x19, b"\x01")]
+    assert velocity(node) == STOP
+
+
+@pytest.mark.parametrize("wanted", [subscribe(rate_hz=0), subscribe(rate_hz=201)])
+def test_a_rate_the_robot_cannot_serve_is_refused(node, bus, wanted):
     tell(node, bus, wanted, now_s=0.0)
     node.poll(1.0)
     assert [answer.payload[0] for answer in bus.answers] == [1]

@@ -94,7 +94,7 @@ def test_quit_stops_releases_and_falls_silent(robot):
         ("chassis speed x 0.1 y 0 z 0 seq 5;", "ok seq 5;"),
         ("chassis speed z -600 seq 0x1F;", "ok seq 0x1F;"),
         ("chassis wheel w1 0 w2 0 w3 0 w4 0;", "ok;"),
-        ("chassis speed ?;", "0.000 0.000 0.000 0.000 0.000 0.000 0.000 ;"),
+        ("chassis speed ?;", "0.000 0.000 0.000 0 0 0 0 ;"),
         ("chassis position ?;", "0.000 0.000 0.000 ;"),
         ("chassis attitude ? seq 9;", "0.000 0.000 0.000  seq 9;"),
         ("chassis status ?;", "1 0 0 0 0 0 0 0 0 0 0 ;"),
@@ -126,7 +126,12 @@ def test_quit_stops_releases_and_falls_silent(robot):
         ("chassis speed x 1e999;", "fail;"),
         ("chassis wheel w1 1001;", "fail;"),
         ("gimbal speed p 1 y 1;", "fail;"),
-        ("chassis move x 1;", "fail;"),
+        ("chassis move x 1;", "ok;"),
+        ("chassis move x 0.1 y 0 z 90 vxy 0.5 vz 90 seq 3;", "ok seq 3;"),
+        ("chassis move x 6;", "fail;"),
+        ("chassis move x 1 vxy 0;", "fail;"),
+        ("chassis move z nan;", "fail;"),
+        ("chassis move far 1;", "command format error: command parse error;"),
         ("chassis;", "fail;"),
     ],
 )
@@ -144,6 +149,31 @@ def test_y_is_to_the_right_and_z_clockwise_in_degrees(robot):
     robot.say("chassis speed x 0.5 y 0.25 z 90;")
     assert robot.plant.velocity_body == pytest.approx((0.5, -0.25, -math.pi / 2))
     assert robot.say("chassis speed ?;").split(" ")[:3] == ["0.500", "0.250", "90.000"]
+
+
+def test_a_move_goes_its_way_and_then_stands(robot):
+    robot.say("chassis move x 0.3 y 0.4 vxy 0.5;")
+    robot.run(0.5)
+    assert robot.plant.velocity_body == pytest.approx((0.3, -0.4, 0.0))
+    robot.run(1.0)
+    assert robot.plant.velocity_body == STOP
+    assert robot.plant.position_xy_m == pytest.approx((0.3, -0.4), abs=0.01)
+
+
+def test_a_move_that_turns_keeps_to_its_line(robot):
+    robot.say("chassis move x 0.5 z 90 vxy 0.5 vz 90;")
+    robot.run(1.5)
+    assert robot.plant.position_xy_m == pytest.approx((0.5, 0.0), abs=0.02)
+    assert robot.plant.heading_rad == pytest.approx(-math.pi / 2, abs=0.03)
+    assert robot.plant.velocity_body == STOP
+
+
+@pytest.mark.parametrize("text", ["chassis speed x 0.1;", "chassis wheel w1 19 w2 19 w3 19 w4 19;", "quit;command;"])
+def test_whatever_comes_after_a_move_ends_it(robot, text):
+    robot.say("chassis move x 2;")
+    robot.say(text)
+    robot.run(1.0)
+    assert robot.plant.velocity_body.vx_mps == pytest.approx(0.0 if text.startswith("quit") else 0.1, abs=0.001)
 
 
 def test_a_number_may_be_hexadecimal(robot):
@@ -166,7 +196,7 @@ def test_wheels_turn_forwards_and_run_round_from_the_front_right(robot, turns, v
 
 def test_wheel_speeds_are_told_right_before_left(robot):
     robot.say("chassis speed z 90;")
-    assert robot.say("chassis speed ?;").split(" ")[3:7] == ["-60.000", "60.000", "-60.000", "60.000"]
+    assert robot.say("chassis speed ?;").split(" ")[3:7] == ["-60", "60", "-60", "60"]
 
 
 def test_while_the_gimbal_leads_the_chassis_does_not_turn_and_each_session_begins_with_the_chassis_leading(robot):

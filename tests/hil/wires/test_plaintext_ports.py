@@ -165,3 +165,20 @@ def test_a_robot_is_driven_and_reports_over_the_network_and_stops_when_its_clien
     until(lambda: not robot.node.is_taken, robot.poll)
     assert robot.plant.velocity_body == STOP
     assert robot.node.faults == robot.transport.refusals == robot.transport.malformed == 0
+
+
+def test_clients_of_the_event_port_are_let_in_and_told_nothing():
+    port = TcpPort(push_port=free_udp_port(), event_port=0)
+    try:
+        clients = [socket.create_connection(("127.0.0.1", port.event_port), PATIENCE_S) for _ in range(10)]
+        for _ in range(20):
+            port.receive()
+        clients[-1].setblocking(False)
+        with pytest.raises(BlockingIOError):
+            clients[-1].recv(1)
+        # The oldest give way, so that whoever keeps connecting takes no more and more descriptors.
+        assert clients[0].recv(1) == b""
+        for client in clients:
+            client.close()
+    finally:
+        port.shutdown()

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hil.fleet.clock import AnsweringClock, SimulatedClock
 from hil.vehicles.can_node import CanMotionController
 from hil.vehicles.motion_controller import MotionController
 from hil.wires.slcan_port import SlcanPort
@@ -133,7 +134,8 @@ def test_python_cans_own_adapter_exchanges_any_frames_with_the_port(frames):
 def test_a_robot_is_driven_and_reports_through_the_port(port):
     plant = FloatingPlant()
     node = CanMotionController(MotionController(plant, deadman_s=None), port)
-    transport = RoboMasterCan(interface="slcan", channel=port.path, sleep_after_open=0)
+    clock = AnsweringClock(SimulatedClock(), node.poll)
+    transport = RoboMasterCan(interface="slcan", channel=port.path, sleep_after_open=0, clock=clock)
     deadline_s = time.monotonic() + PATIENCE_S
     beat = 0
 

@@ -5,7 +5,7 @@ import pytest
 
 from mtm_onboard.control.control import Control, Session
 from mtm_onboard.journal.journal import Journal, JournalHeader, read_journal
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.protocol.framing import Framing
@@ -46,7 +46,7 @@ class Robot:
             modulator=self.modulator,
             guard=self.guard,
             source=HeldSource(),
-            transport=NullTransport(),
+            transport=NullLink(),
             stats=self.stats,
             journal=journal,
             tick=lambda: self.tick,

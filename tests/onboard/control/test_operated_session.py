@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from mtm_onboard.control.control_socket import ControlSocket, ask
 from mtm_onboard.control.session import Outcome, Plan, run_session, start_of
 from mtm_onboard.journal.journal import read_journal
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.protocol.framing import Framing
@@ -163,8 +163,8 @@ def test_the_operator_s_stop_over_the_socket_holds_to_the_end_of_the_run(config)
 
 
 def test_a_session_whose_control_socket_is_taken_does_not_open_the_link(config, monkeypatch):
-    link = NullTransport()
-    monkeypatch.setattr("mtm_onboard.control.session.make_transport", lambda kind, options: link)
+    link = NullLink()
+    monkeypatch.setattr("mtm_onboard.control.session.make_link", lambda kind, options: link)
     with ControlSocket(Path(config.control.socket)), pytest.raises(MtmError, match="another run"):
         run_session(config, KEY, Plan(1), lambda: True)
     assert link.sent == 0

@@ -7,16 +7,17 @@ from itertools import count
 import pytest
 
 from mtm_onboard.control.session import Plan, run_session
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.base import LinkBusyError
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Channel, Key, MtmError
-from mtm_onboard.runtime.config import LinkSettings, RealtimeSettings, RobotConfig, config_from_table
+from mtm_onboard.runtime.config import JournalSettings, LinkSettings, RealtimeSettings, RobotConfig, config_from_table
 from tests.onboard.schemes import FAKE_SECRET, small_scheme
 
 KEY = Key("fake-key", FAKE_SECRET, small_scheme())
 
 
-class Link(NullTransport):
+class Link(NullLink):
     """Fails where it is told to, and keeps what happened in order."""
 
     def __init__(self, failing: str = "", failing_from: int = 2) -> None:
@@ -65,7 +66,7 @@ def use(monkeypatch):
     monkeypatch.setattr("mtm_onboard.control.session.StdinSource", Silence)
 
     def patch(link: Link) -> Link:
-        monkeypatch.setattr("mtm_onboard.control.session.make_transport", lambda kind, options: link)
+        monkeypatch.setattr("mtm_onboard.control.session.make_link", lambda kind, options: link)
         return link
 
     return patch
@@ -110,6 +111,37 @@ def test_a_link_that_fails_on_the_way_stops_the_robot_and_is_an_error(config, us
     assert link.events[0] == "open"
     assert link.events[-2:] == ["stop", "close"]
     assert "service" not in {thread.name for thread in threading.enumerate()}
+
+
+def test_a_robot_that_is_not_there_is_an_error_and_no_run(config, tmp_path):
+    journal = {"path": str(tmp_path / "a.csv")}
+    can = replace(
+        config, transport_kind="robomaster-can", transport_options={"interface": "virtual", "channel": "void"}
+    )
+    with pytest.raises(MtmError, match="Nothing has come from the robot"):
+        run_session(replace(can, journal=JournalSettings(**journal)), KEY, Plan((0, 1, 2, 3)), never)
+    assert not (tmp_path / "a.csv").exists()
+
+
+def test_the_summary_tells_what_the_link_counted_and_what_did_not_leave(config, use):
+    class Counting(Link):
+        degraded = "no telemetry"
+
+        def counters(self) -> dict[str, int]:
+            return {"missed_heartbeats": 3, "refusals": 0}
+
+        def send(self, velocity: BodyVelocity) -> None:
+            super().send(velocity)
+            if self.sent > 3:
+                raise LinkBusyError("full")
+
+    link = use(Counting())
+    outcome = run_session(replace(config, link=LinkSettings()), KEY, Plan((0, 1, 2, 3)), lambda: link.sent >= 6)
+    told = outcome.summary()
+    assert (outcome.stats.sent, outcome.stats.unsent) == (3, 3)
+    assert told.startswith("3 ticks sent, 3 unsent, ")
+    assert "1 times degraded" in told
+    assert told.endswith("; the link counted: dropped 3, missed heartbeats 3")
 
 
 def test_a_link_that_does_not_open_is_an_error(config, use):

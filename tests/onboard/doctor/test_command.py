@@ -5,7 +5,7 @@ import pytest
 
 from mtm_onboard.cli import main
 from mtm_onboard.doctor.finding import Finding, worst
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.none import NullLink
 
 CONFIG = """
 [robot]
@@ -63,7 +63,7 @@ def test_a_robot_in_order_passes_line_by_line(robot, capsys):
 
 def test_nothing_is_opened_that_could_move_the_robot(robot, monkeypatch):
     for name in ("open", "resume", "send", "service", "stop"):
-        monkeypatch.setattr(NullTransport, name, lambda *_: pytest.fail("the link was touched"))
+        monkeypatch.setattr(NullLink, name, lambda *_: pytest.fail("the link was touched"))
     assert doctor(robot) == 0
 
 

@@ -61,7 +61,7 @@ class FillingDisk:
 
 def write(journal: Journal, ticks) -> None:
     for tick in ticks:
-        journal.append(tick, 10.0 + tick / 50.0 + 0.003, BASE, SENT, NOISE | CLAMPED)
+        journal.append(tick, 10.0 + tick / 50.0 + 0.003, BASE, SENT, NOISE | CLAMPED, 0.003)
 
 
 @pytest.mark.parametrize("threaded", [False, True])
@@ -284,8 +284,8 @@ def test_whatever_stands_behind_a_journal_s_rows_is_skipped(tmp_path_factory, ru
 
 def test_the_noise_that_reached_the_robot_is_sent_less_base_where_it_was_sent(tmp_path):
     with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
-        journal.append(0, 10.0, BASE, SENT, NOISE)
-        journal.append(1, 10.02, BASE, SENT, UNSENT)
+        journal.append(0, 10.0, BASE, SENT, NOISE, 0.0)
+        journal.append(1, 10.02, BASE, SENT, UNSENT, 0.0)
     noise = read_journal(journal.path).noise
     assert noise[0] == pytest.approx([0.05, -0.05, 1 / 3 - 0.3], abs=1e-8)
     assert not noise[1].any()

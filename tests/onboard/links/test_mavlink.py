@@ -7,8 +7,8 @@ import pytest
 
 from hil.vehicles.mavlink_vehicle import MavlinkVehicle
 from mtm_onboard.links.base import TakenOverError
-from mtm_onboard.links.factory import make_transport
-from mtm_onboard.links.mavlink import MavlinkTransport
+from mtm_onboard.links.factory import make_link
+from mtm_onboard.links.mavlink import MavlinkLink
 from mtm_onboard.links.mavlink_codec import MavlinkCodec
 from mtm_onboard.links.mavlink_messages import velocity_setpoint
 from mtm_onboard.links.mavlink_ports import UdpPort
@@ -19,7 +19,7 @@ from mtm_onboard.protocol import MtmError
 from mtm_onboard.runtime.loop import run_loop
 from mtm_onboard.runtime.service import ServiceThread
 from tests.hil.vehicles.floating_plant import FloatingPlant
-from tests.onboard.links.conformance import TransportConformance
+from tests.onboard.links.conformance import LinkConformance
 from tests.onboard.links.mavlink_rig import FIRMWARES, line_rig, mavlink_rig
 from tests.onboard.links.mavlink_spec import read_frames
 
@@ -28,26 +28,26 @@ SET_MODE, ARM = 176, 400
 EXAMPLE = Path(__file__).parents[3] / "docs" / "robot.example.toml"
 
 
-class TestMavlinkCopterConforms(TransportConformance):
+class TestMavlinkCopterConforms(LinkConformance):
     @pytest.fixture
     def rig(self):
         return mavlink_rig("copter", vehicle={"goes_on": True})
 
 
-class TestMavlinkOverALineConforms(TransportConformance):
+class TestMavlinkOverALineConforms(LinkConformance):
     @pytest.fixture
     def rig(self):
         with line_rig("copter", vehicle={"goes_on": True}) as rig:
             yield rig
 
 
-class TestMavlinkPx4Conforms(TransportConformance):
+class TestMavlinkPx4Conforms(LinkConformance):
     @pytest.fixture
     def rig(self):
         return mavlink_rig("px4", vehicle={"goes_on": True})
 
 
-class TestMavlinkRoverConforms(TransportConformance):
+class TestMavlinkRoverConforms(LinkConformance):
     askew = BodyVelocity(0.5, 0.0, 0.25)
     other = BodyVelocity(-0.5, 0.0, 0.5)
 
@@ -263,6 +263,9 @@ def test_a_vehicle_that_falls_silent_is_not_driven_on():
         rig.drive(FORWARD)
         rig.vehicle._port.is_cut = True
         began_s = rig.clock.now()
+        assert rig.transport.degraded == ""
+        rig.drive(FORWARD, 2.0)
+        assert rig.transport.degraded == "the vehicle's heartbeat is late"
         with pytest.raises(MtmError, match="last heard 3.5 s ago"):
             rig.drive(FORWARD, 10.0)
         assert 2.4 < rig.clock.now() - began_s < 3.6
@@ -391,14 +394,14 @@ def test_commands_and_heartbeats_from_two_threads_never_share_a_number(hasty_thr
 )
 def test_options_that_make_no_sense_are_refused_in_one_sentence(options, sentence):
     with pytest.raises(MtmError, match=sentence):
-        MavlinkTransport(**({"endpoint": "udpin:0.0.0.0:14550", "profile": "copter"} | options))
+        MavlinkLink(**({"endpoint": "udpin:0.0.0.0:14550", "profile": "copter"} | options))
 
 
 def test_the_configuration_s_kind_makes_it_and_a_wrong_option_is_one_sentence():
-    transport = make_transport("mavlink", {"endpoint": "udpin:127.0.0.1:14550", "profile": "px4", "set_mode": True})
-    assert isinstance(transport, MavlinkTransport)
+    transport = make_link("mavlink", {"endpoint": "udpin:127.0.0.1:14550", "profile": "px4", "set_mode": True})
+    assert isinstance(transport, MavlinkLink)
     with pytest.raises(MtmError, match="does not take these options"):
-        make_transport("mavlink", {"endpoint": "udpin:127.0.0.1:14550", "profile": "px4", "set_modes": True})
+        make_link("mavlink", {"endpoint": "udpin:127.0.0.1:14550", "profile": "px4", "set_modes": True})
 
 
 def test_the_documented_options_are_those_it_takes_and_their_defaults(tmp_path):
@@ -408,15 +411,15 @@ def test_the_documented_options_are_those_it_takes_and_their_defaults(tmp_path):
     key_file = tmp_path / options["signing_key_file"]
     key_file.touch(0o600)
     key_file.write_text("00" * 32)
-    transport = make_transport(options.pop("kind"), options | {"signing_key_file": str(key_file)})
-    assert isinstance(transport, MavlinkTransport)
+    transport = make_link(options.pop("kind"), options | {"signing_key_file": str(key_file)})
+    assert isinstance(transport, MavlinkLink)
     assert {"set_mode": False, "arm": False, "target_system": 1, "open_timeout_s": 10.0}.items() <= options.items()
 
 
 def test_a_missing_library_is_one_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "pymavlink.dialects.v20", None)
     with pytest.raises(MtmError, match=r"install it with: pip install .*\[mavlink\]"):
-        MavlinkTransport("udpin:127.0.0.1:14550", profile="copter")
+        MavlinkLink("udpin:127.0.0.1:14550", profile="copter")
 
 
 @pytest.mark.realtime
@@ -426,19 +429,19 @@ def test_a_vehicle_is_driven_over_udp_in_real_time():
     clock, ended = SystemClock(), threading.Event()
     began_s = clock.now()
 
-    def poll(_tick, now_s):
+    def poll(_tick, now_s, _late_s):
         vehicle.poll(now_s - began_s)
 
     far_end = threading.Thread(
         target=run_loop, args=(clock, 100.0, poll), kwargs=dict(start_s=began_s, stop=ended.is_set)
     )
     far_end.start()
-    transport = MavlinkTransport(f"udpout:127.0.0.1:{there.number}", profile="px4", set_mode=True, arm=True)
+    transport = MavlinkLink(f"udpout:127.0.0.1:{there.number}", profile="px4", set_mode=True, arm=True)
     try:
         with transport, ServiceThread(transport, clock) as service:
             start_s = clock.now()
 
-            def step(_tick, _now_s):
+            def step(_tick, _now_s, _late_s):
                 transport.send(BodyVelocity(0.5, 0.25, 0.0))
 
             run_loop(clock, 50.0, step, start_s=start_s, stop=lambda: clock.now() > start_s + 1.0)

@@ -8,7 +8,7 @@ from hil.fleet.clock import SimulatedClock
 from hil.plants.unicycle import UnicyclePlant
 from hil.vehicles.mavlink_firmware import ROVER
 from hil.vehicles.mavlink_vehicle import MavlinkVehicle
-from mtm_onboard.links.mavlink import MavlinkTransport
+from mtm_onboard.links.mavlink import MavlinkLink
 from mtm_onboard.links.mavlink_codec import MavlinkCodec
 from mtm_onboard.links.mavlink_ports import StreamPort, UdpPort, port_opener
 from mtm_onboard.model.velocity import STOP, BodyVelocity
@@ -113,7 +113,7 @@ def test_a_rover_is_driven_over_udp_whoever_listens_and_a_stranger_gets_nothing(
     plant = UnicyclePlant(lag_s=0.1)
     vehicle = MavlinkVehicle(ROVER, plant, there, is_guided=True, is_armed=True)
     kind = "udpin" if listens == "transport" else "udpout"
-    transport = MavlinkTransport(f"{kind}:127.0.0.1:{number}", profile="rover", clock=clock)
+    transport = MavlinkLink(f"{kind}:127.0.0.1:{number}", profile="rover", clock=clock)
     stranger = UdpPort(peer=here)
     other = MavlinkCodec(66, 1)
     clock.every(0.010, vehicle.poll)

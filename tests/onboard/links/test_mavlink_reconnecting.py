@@ -6,8 +6,8 @@ The wrapper is served by the test itself, between commands, as its own thread wo
 import pytest
 
 from mtm_onboard.links.base import TakenOverError
-from mtm_onboard.links.mavlink import MavlinkTransport
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.mavlink import MavlinkLink
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
 from tests.onboard.links.mavlink_rig import mavlink_rig
@@ -22,12 +22,12 @@ class Link:
         self.rig = rig
 
         def make():
-            return MavlinkTransport(
+            return MavlinkLink(
                 profile=profile, set_mode=True, arm=True, open_timeout_s=2.0, clock=rig.clock,
                 open_port=lambda: rig.wire,
             )  # fmt: skip
 
-        self.transport = ReconnectingTransport(make, rig.clock)
+        self.transport = ReconnectingLink(make, rig.clock)
 
     def drive(self, seconds):
         end_s = self.rig.clock.now() + seconds

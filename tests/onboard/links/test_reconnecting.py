@@ -11,8 +11,8 @@ from hil.vehicles.motion_controller import MotionController
 from hil.wires.slcan_port import SlcanPort
 from mtm_onboard.journal.journal import Journal
 from mtm_onboard.links.base import LinkBusyError, TakenOverError
-from mtm_onboard.links.none import NullTransport
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.none import NullLink
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
@@ -22,17 +22,17 @@ from mtm_onboard.runtime.modulator import Modulator
 from tests.hil.vehicles.floating_plant import FloatingPlant
 from tests.onboard.driven import Driven
 from tests.onboard.links.can_rig import VirtualRig, can_rig
-from tests.onboard.links.conformance import Rig, TransportConformance
+from tests.onboard.links.conformance import LinkConformance, Rig
 from tests.onboard.schemes import small_codebook
 
 BASE = BodyVelocity(0.3, -0.1, 0.5)
 
 
-class TestReconnectingConforms(TransportConformance):
+class TestReconnectingConforms(LinkConformance):
     @pytest.fixture
     def rig(self):
         with can_rig(VirtualRig) as rig:
-            link = ReconnectingTransport(rig.remake, rig.clock)
+            link = ReconnectingLink(rig.remake, rig.clock)
             rig.clock.every(link.service_period_s, link.service)
             yield Rig(
                 link, rig.controller, rig.plant, rig.clock, lambda: sum(map(len, rig.sent())), clog=rig.clog,
@@ -59,13 +59,13 @@ class Bench:
     def times_s(self, name: str) -> list[float]:
         return [when_s for when_s, what in self.events if what == name]
 
-    def reconnecting(self, **options) -> ReconnectingTransport:
-        link = ReconnectingTransport(self.make, self.clock, **options)
+    def reconnecting(self, **options) -> ReconnectingLink:
+        link = ReconnectingLink(self.make, self.clock, **options)
         self.clock.every(link.service_period_s, link.service)
         return link
 
 
-class BenchLink(NullTransport):
+class BenchLink(NullLink):
     def __init__(self, bench: Bench) -> None:
         super().__init__()
         self.bench = bench
@@ -114,7 +114,7 @@ def test_while_the_link_is_down_ticks_go_on_and_openings_are_tried_ever_more_rar
     driven.run(0.1, BASE)
     bench.error, bench.is_absent = OSError("cable pulled"), True
     driven.run(20.0, BASE)
-    assert driven.stats.sent == 5 + 1000
+    assert (driven.stats.sent, driven.stats.unsent) == (5, 1000)
     assert (link.losses, link.dropped, driven.guard.unsent) == (1, 1000, 1000)
     assert link.fault == "no such port"
     pauses_s = np.diff([0.1, *bench.times_s("open")[1:]])
@@ -337,10 +337,33 @@ def test_the_journal_tells_of_the_outage_and_holds_nothing_that_was_not_sent(ben
 
 def test_health_is_the_wrapper_s_and_the_link_s(bench):
     with bench.reconnecting() as link:
-        assert link.health() == {"link_up": True, "link_losses": 0, "dropped": 0}
+        assert link.health() == {
+            "link_up": True, "link_state": "up", "link_trouble": "", "link_losses": 0, "dropped": 0,
+        }  # fmt: skip
         bench.service_error, bench.is_absent = OSError("no heartbeat"), True
         bench.clock.sleep_until(0.5)
-        assert link.health() == {"link_up": False, "link_losses": 1, "dropped": 0}
+        assert link.health() == {
+            "link_up": False, "link_state": "down", "link_trouble": "no such port", "link_losses": 1, "dropped": 0,
+        }  # fmt: skip
+
+
+def test_a_degraded_link_is_up_and_says_why(bench):
+    with bench.reconnecting() as link:
+        link.link.degraded = "no telemetry"
+        health = link.health()
+        assert (health["link_up"], health["link_state"], health["link_trouble"]) == (True, "degraded", "no telemetry")
+
+
+def test_counters_go_on_over_all_the_links_that_were_used(bench, monkeypatch):
+    monkeypatch.setattr(BenchLink, "counters", lambda self: {"refusals": 2}, raising=False)
+    with bench.reconnecting() as link:
+        for _ in range(2):
+            bench.service_error = OSError("no heartbeat")
+            bench.clock.sleep_until(bench.clock.now() + 0.02)
+            bench.service_error = None
+            bench.clock.sleep_until(bench.clock.now() + 1.0)
+        assert link.counters() == {"link_losses": 2, "dropped": 0, "refusals": 6}
+        assert link.health()["refusals"] == 6
 
 
 phases = st.lists(
@@ -377,7 +400,8 @@ def test_whatever_the_link_goes_through_the_robot_moves_only_for_a_young_command
                     assert last_command_s > up_since_s
             up_since_s = math.inf if link.up_since_s is None else link.up_since_s
     assert driven.guard.unsent == link.dropped
-    assert driven.stats.sent == sum(ticks for _, _, ticks in phases)
+    assert driven.stats.unsent == link.dropped
+    assert driven.stats.sent + driven.stats.unsent == sum(ticks for _, _, ticks in phases)
 
 
 class Adapter:
@@ -402,7 +426,7 @@ class Adapter:
 
     def make(self) -> RoboMasterCan:
         path = "/dev/not-plugged-in" if self.port is None else self.port.path
-        return RoboMasterCan(interface="slcan", channel=path, sleep_after_open=0)
+        return RoboMasterCan(interface="slcan", channel=path, sleep_after_open=0, clock=self.clock)
 
     def _poll(self, now_s: float) -> None:
         if self.port is None:
@@ -413,7 +437,7 @@ class Adapter:
 
 def test_a_serial_adapter_that_is_unplugged_and_plugged_in_again_drives_on():
     adapter = Adapter()
-    link = ReconnectingTransport(adapter.make, adapter.clock)
+    link = ReconnectingLink(adapter.make, adapter.clock)
     adapter.clock.every(link.service_period_s, link.service)
     forward = BodyVelocity(0.5, 0.0, 0.0)
     try:
@@ -440,7 +464,7 @@ def test_a_serial_adapter_that_is_unplugged_and_plugged_in_again_drives_on():
 
 def test_a_serial_adapter_that_stops_reading_is_a_lost_link_and_holds_up_no_tick():
     adapter = Adapter()
-    link = ReconnectingTransport(adapter.make, adapter.clock, give_up_s=math.inf)
+    link = ReconnectingLink(adapter.make, adapter.clock, give_up_s=math.inf)
     link.open()
     driven = Driven(link, adapter.clock)
     # Nobody polls the far end from here on, and nobody serves the link.

@@ -5,6 +5,7 @@ import socket
 import threading
 import time
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -13,13 +14,13 @@ from hypothesis import strategies as st
 
 from hil.wires.plaintext_ports import LinePort
 from mtm_onboard.links.base import LinkBusyError
-from mtm_onboard.links.factory import make_transport
+from mtm_onboard.links.factory import make_link
 from mtm_onboard.links.robomaster_plaintext import MOST_UNANSWERED
 from mtm_onboard.links.robomaster_tcp import RoboMasterTcp
 from mtm_onboard.links.robomaster_uart import RoboMasterUart
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
-from tests.onboard.links.conformance import Rig, TransportConformance
+from tests.onboard.links.conformance import LinkConformance, Rig
 from tests.onboard.links.plaintext_rig import OverSocket, free_udp_port, plaintext_rig
 
 FORWARD = BodyVelocity(0.5, 0.0, 0.0)
@@ -32,7 +33,7 @@ RELEASE = 3 * b"chassis speed x 0.0000 y 0.0000 z 0.000;" + 2 * b"quit;"
 STALL_S = 0.25
 
 
-class TestRoboMasterPlaintextConforms(TransportConformance):
+class TestRoboMasterPlaintextConforms(LinkConformance):
     @pytest.fixture(params=["memory", "pty", "tcp"])
     def rig(self, request):
         with plaintext_rig(request.param) as rig:
@@ -390,9 +391,9 @@ def test_a_taken_push_port_is_one_sentence_and_leaves_no_connection_behind():
 
 def test_a_robot_that_is_not_there_is_one_sentence():
     with pytest.raises(MtmError, match="cannot be reached"):
-        make_transport("robomaster-tcp", {"host": "127.0.0.1", "port": 1, "push_port": free_udp_port()}).open()
+        make_link("robomaster-tcp", {"host": "127.0.0.1", "port": 1, "push_port": free_udp_port()}).open()
     with pytest.raises(MtmError, match="/dev/there-is-none cannot be opened"):
-        make_transport("robomaster-uart", {"port": "/dev/there-is-none"}).open()
+        make_link("robomaster-uart", {"port": "/dev/there-is-none"}).open()
 
 
 @pytest.mark.parametrize("host", ["robot.local", "192.168.2", "", "::1"])
@@ -408,10 +409,42 @@ def test_the_example_configuration_s_alternatives_make_a_link(kind, kept):
     lines = [line.removeprefix("# ") for line in section.splitlines() if re.match(r"# \w+ = ", line)]
     start = next(number for number, line in enumerate(lines) if kind in line)
     table = tomllib.loads("\n".join(itertools.takewhile(lambda line: "kind" not in line, lines[start + 1 :])))
-    assert isinstance(make_transport(kind, table), kept)
+    assert isinstance(make_link(kind, table), kept)
 
 
 @pytest.mark.parametrize(("kind", "options"), [("robomaster-uart", {}), ("robomaster-tcp", {"hots": "x"})])
 def test_options_that_a_link_does_not_take_are_one_sentence(kind, options):
     with pytest.raises(MtmError, match=r"correct \[transport\]"):
-        make_transport(kind, options)
+        make_link(kind, options)
+
+
+def test_what_was_sent_is_what_arrives_on_a_line_that_fills(line):
+    transport, far = line
+    transport.open()
+    data, sent = b"", 0
+    for number in range(4000):
+        try:
+            transport.send(BodyVelocity(0.0001 * (number % 1000), 0.0, 0.0))
+            sent += 1
+        except LinkBusyError:
+            data += arrived(far)
+        vars(transport)["_answered"] = vars(transport)["_sent"]  # as if the robot had answered
+    transport.stop()
+    far.setblocking(False)
+    with suppress(BlockingIOError):
+        while part := far.recv(1_000_000):
+            data += part
+    assert sent < 4000
+    assert data.removeprefix(OPENING).removesuffix(RELEASE).count(b";") == sent
+
+
+def test_a_robot_that_falls_behind_is_doubted_before_it_is_lost(line):
+    transport, far = line
+    transport.open()
+    for _ in range(12):
+        transport.send(FORWARD)
+    transport.service(0.0)
+    assert transport.degraded == "the robot does not answer its commands"
+    far.send(b"ok seq 15;")
+    transport.service(0.1)
+    assert transport.degraded == ""

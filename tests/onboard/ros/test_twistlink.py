@@ -13,12 +13,12 @@ from mtm_onboard.ros.twistlink import TwistLink
 from mtm_onboard.runtime.modulator import Modulator
 from tests.hil.vehicles.floating_plant import FloatingPlant
 from tests.onboard.driven import Driven
-from tests.onboard.links.conformance import Rig, TransportConformance
+from tests.onboard.links.conformance import LinkConformance, Rig
 from tests.onboard.ros.fake_ros import Twist, Vector3, twist
 from tests.onboard.schemes import small_codebook
 
 
-class TestTwistLinkConforms(TransportConformance):
+class TestTwistLinkConforms(LinkConformance):
     """The robot at the other end of the topic takes REP-103 twists."""
 
     @pytest.fixture

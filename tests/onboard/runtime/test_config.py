@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_onboard.links.factory import make_transport
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.factory import make_link
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import STOP
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.runtime.config import (
@@ -132,15 +132,15 @@ def test_files_that_hold_no_configuration_are_refused(tmp_path):
 
 
 def test_the_factory_makes_what_the_configuration_names():
-    assert isinstance(make_transport("none", {}), NullTransport)
+    assert isinstance(make_link("none", {}), NullLink)
     with pytest.raises(MtmError, match="choose one of: none, robomaster-can"):
-        make_transport("tachyon", {})
+        make_link("tachyon", {})
     with pytest.raises(MtmError, match=r"correct \[transport\]"):
-        make_transport("none", {"bitrate": 1_000_000})
+        make_link("none", {"bitrate": 1_000_000})
 
 
 def test_a_dry_run_s_link_counts_and_refuses_what_is_not_finite():
-    link = NullTransport()
+    link = NullLink()
     with link:
         link.send(STOP)
         with pytest.raises(ValueError, match="finite"):

@@ -24,7 +24,7 @@ class SlowClock(SimulatedClock):
 def run(clock, until_s: float, *, rate_hz: float = 50.0, start_s: float = 0.0):
     calls: list[tuple[int, float]] = []
     stats = run_loop(
-        clock, rate_hz, lambda tick, now_s: calls.append((tick, now_s)), start_s=start_s,
+        clock, rate_hz, lambda tick, now_s, _late_s: calls.append((tick, now_s)), start_s=start_s,
         stop=lambda: clock.now() >= until_s - 1e-9,
     )  # fmt: skip
     return calls, stats
@@ -58,11 +58,28 @@ def test_ticks_slept_through_are_skipped_and_counted_and_never_caught_up():
     assert stats.lateness.worst_s == pytest.approx(0.05)
 
 
+def test_a_step_is_told_how_late_it_is_with_the_ticks_it_missed():
+    clock, lates_s = SlowClock([0, 0, 0.137, 0.003]), []
+    stats = run_loop(
+        clock, 50.0, lambda tick, now_s, late_s: lates_s.append(late_s), start_s=0.0, stop=lambda: clock.now() >= 0.3
+    )
+    assert lates_s[:5] == pytest.approx([0.0, 0.0, 0.137, 0.003, 0.0], abs=1e-6)
+    assert (stats.missed, stats.lateness.worst_s) == (6, pytest.approx(0.137))
+
+
+def test_a_step_that_sent_nothing_is_counted_as_unsent_and_not_as_sent():
+    clock = SimulatedClock()
+    stats = run_loop(
+        clock, 50.0, lambda tick, now_s, late_s: tick % 5 != 0, start_s=0.0, stop=lambda: clock.now() >= 1.99
+    )
+    assert (stats.sent, stats.unsent, stats.missed) == (80, 20, 0)
+
+
 def test_a_step_that_takes_three_periods_costs_the_ticks_in_between():
     clock = SimulatedClock()
     ticks = []
 
-    def step(tick: int, now_s: float) -> None:
+    def step(tick: int, now_s: float, _late_s: float) -> None:
         ticks.append(tick)
         clock.sleep_until(now_s + (0.061 if tick == 2 else 0.0))
 
@@ -83,7 +100,7 @@ def test_however_late_the_wake_ups_no_tick_comes_twice_or_early(delays_s, rate_h
 def test_steps_that_take_longer_than_a_period_are_counted():
     clock = SimulatedClock()
 
-    def step(tick: int, now_s: float) -> None:
+    def step(tick: int, now_s: float, _late_s: float) -> None:
         clock.sleep_until(now_s + (0.05 if tick % 10 == 4 else 0.01))
 
     stats = run_loop(clock, 50.0, step, start_s=0.0, stop=lambda: clock.now() >= 1.99)
@@ -93,13 +110,13 @@ def test_steps_that_take_longer_than_a_period_are_counted():
 def test_stop_is_asked_before_each_tick_and_statistics_outlive_an_exception():
     stats = LoopStats()
 
-    def step(tick: int, _: float) -> None:
+    def step(tick: int, *_: float) -> None:
         if tick == 3:
             raise MtmError("the link is down; check it")
 
     with pytest.raises(MtmError, match="link"):
         run_loop(SimulatedClock(), 50.0, step, start_s=0.0, stop=lambda: False, stats=stats)
-    assert stats.sent == 3
+    assert (stats.sent, stats.unsent) == (3, 1)
     assert run_loop(SimulatedClock(), 50.0, step, start_s=0.0, stop=lambda: True).sent == 0
 
 
