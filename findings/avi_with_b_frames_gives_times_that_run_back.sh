@@ -1,7 +1,7 @@
 # av 18.1.0, opencv-python-headless 5.0.0.93: H.264 with B-frames in AVI shows the right order with times that run backwards
 #
 # Behaviour: 60 H.264 frames with B-frames are muxed into AVI. The pictures come out in the right
-#   order, but their pts run 1, 3, 2, 5, 6, 4, ...: a quarter or more of the steps go backwards. The
+#   order, but their pts run 1, 4, 3, 5, 2, 8, ...: nearly half of the steps go backwards. The
 #   frames' dts run evenly. OpenCV hides the disorder, but begins at 67 ms and gives the last frames
 #   the position 0.
 # Guess: pts is the time at which to show a frame, whatever the container; dts is the odd one.

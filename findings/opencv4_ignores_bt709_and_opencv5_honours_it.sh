@@ -1,0 +1,46 @@
+# opencv-python-headless 4.12.0.88 and 5.0.0.93, av 18.1.0: the same BT.709 film has other colours in OpenCV 4 than in OpenCV 5
+#
+# Behaviour: one plain colour is coded as H.264 with BT.709 and tagged so, as most HD cameras do. OpenCV 4.12's VideoCapture
+#   decodes it as BT.601: red 200 reads 187, green 60 reads 45. OpenCV 5.0 honours the tag and is
+#   within 3 of the truth, as is PyAV in both. A film tagged BT.601 is right everywhere.
+# Guess: VideoCapture gives the film's colours; an upgrade changes speed, not pixels.
+# So: a colour threshold tuned under OpenCV 4, or with PyAV, does not fit the other one. Say with
+#   which version colours were chosen, and leave room of 15 levels.
+# Source: https://github.com/opencv/opencv/blob/5.x/modules/videoio/src/cap_ffmpeg_impl.hpp (conversion by
+#   swscale, with or without sws_setColorspaceDetails)
+set -euo pipefail
+tmp=$(mktemp -d)
+trap 'rm -rf "$tmp"' EXIT
+cd "$tmp"
+for v in old new; do python3 -m venv $v; done
+old/bin/pip install --quiet --disable-pip-version-check --no-compile opencv-python-headless==4.12.0.88 av==18.1.0
+new/bin/pip install --quiet --disable-pip-version-check --no-compile opencv-python-headless==5.0.0.93 av==18.1.0
+cat > read.py <<'END'
+import av, cv2, numpy as np
+truth = np.array([200, 60, 30])
+print("OpenCV", cv2.__version__)
+def film(name, space):  # 1: BT.709, 5: BT.601
+    with av.open(name, "w") as c:
+        s = c.add_stream("libx264", rate=30, options={"crf": "1"})
+        s.width = s.height = 128
+        s.pix_fmt = "yuv420p"
+        s.codec_context.colorspace, s.codec_context.color_primaries = space, 1
+        s.codec_context.color_trc, s.codec_context.color_range = 1, 1
+        picture = np.full((128, 128, 3), truth, np.uint8)
+        for _ in range(5):
+            f = av.VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="yuv420p", dst_colorspace=space)
+            f.colorspace = space
+            c.mux(s.encode(f))
+        c.mux(s.encode(None))
+    with av.open(name) as c:
+        by_av = next(c.decode(video=0)).to_ndarray(format="rgb24")[5, 5].astype(int)
+    by_cv = cv2.VideoCapture(name).read()[1][5, 5, ::-1].astype(int)
+    print(f"{name}: PyAV {by_av}, OpenCV {by_cv}, truth {truth}")
+    return np.abs(by_av - truth).max(), np.abs(by_cv - truth).max()
+assert max(film("bt601.mp4", 5)) <= 3
+by_av, by_cv = film("bt709.mp4", 1)
+assert by_av <= 3
+assert by_cv > 10 if cv2.__version__.startswith("4") else by_cv <= 3
+END
+old/bin/python read.py
+new/bin/python read.py
