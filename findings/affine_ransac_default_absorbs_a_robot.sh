@@ -1,14 +1,14 @@
 # opencv-python-headless 5.0.0.93, numpy 2.4.6: estimateAffinePartial2D calls a robot moving by 1 px background
 #
 # Behaviour: with its default RANSAC threshold of 3 px, cv2.estimateAffinePartial2D counts 6 corners
-#   that lie on a robot moving by 1 px as inliers among 14 still ones. The "camera motion" it returns
-#   at the robot is a third of the robot's own motion, so stabilising by it removes that third.
-#   With a threshold of 0.3 px (ten times the corner noise) nothing is removed.
+#   that lie on a robot moving by 1 px as inliers among 14 still ones. The "camera motion" it
+#   returns at the robot is a third of the robot's own motion, so stabilising by it removes that
+#   third. With a threshold of 0.3 px (ten times the corner noise) nothing is removed.
 # Guess: RANSAC is robust, 6 outliers of 20 are few, and so stabilising leaves the robot alone.
 # So: the threshold must follow the corner noise, not the default, and the robot is to be masked.
 #   Motion below 3 px is the normal case for a robot filmed from a distance.
 # Source: default ransacReprojThreshold = 3 in
-#   https://docs.opencv.org/5.x/d9/d0c/group__calib3d.html (estimateAffinePartial2D)
+#   https://docs.opencv.org/4.x/d9/d0c/group__calib3d.html (estimateAffinePartial2D)
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

@@ -1,8 +1,8 @@
 # pupil-apriltags 1.0.4.post11, opencv-python-headless 5.0.0.93: two readers of one AprilTag differ by half a pixel, the order of corners and half a turn
 #
-# Behaviour: the AprilTag library puts the centre of the first pixel at (0.5, 0.5), OpenCV at (0, 0), so
-#   all corners lie 0.5 px further right and down. AprilTag's corners run the other way round, and its
-#   tag frame is turned by 180 degrees against the first side of OpenCV's corners.
+# Behaviour: the AprilTag library puts the centre of the first pixel at (0.5, 0.5), OpenCV at (0,
+#   0), so all corners lie 0.5 px further right and down. AprilTag's corners run the other way
+#   round, and its tag frame is turned by 180 degrees against the first side of OpenCV's corners.
 # Guess: the same family, number and picture give the same corners in the same order.
 # So: changing the reader within a recording, or calibrating with one and measuring with the other,
 #   shifts every position by half a pixel and turns every heading round.

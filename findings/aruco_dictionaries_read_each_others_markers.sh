@@ -1,13 +1,15 @@
 # opencv-python-headless 5.0.0.93, numpy 2.4.6: a 1000-word 4x4 dictionary reads AprilTags, and the families share numbers
 #
-# Behaviour: clean pictures of one marker family are read as valid markers of another one:
-#   AprilTag 36h11 number 32 as 4x4_1000 number 391, AprilTag 16h5 numbers 16 and 18 as 227 and 854,
-#   six of the first 250 of 4x4_1000 as AprilTag 16h5, 6x6 number 198 as AprilTag 25h9 number 18.
-#   The 50, 100, 250 and 1000-word dictionaries of one size are prefixes of each other.
+# Behaviour: clean pictures of one marker family are read as valid markers of another one: AprilTag
+#   36h11 number 32 as 4x4_1000 number 391, AprilTag 16h5 numbers 16 and 18 as 227 and 854, six of
+#   the first 250 of 4x4_1000 as AprilTag 16h5, 6x6 number 198 as AprilTag 25h9 number 18. All of
+#   4x4_50 are read by 4x4_1000, under the same numbers.
 # Guess: families of different sizes cannot be confused, the more so with error correction checked.
 # So: "a marker of our family was seen" is no proof that it is one of ours where other tags hang in
-#   the room. Take the smallest dictionary that suffices and ignore numbers that were not handed out.
-# Source: https://github.com/opencv/opencv/blob/5.x/modules/objdetect/src/aruco/predefined_dictionaries.hpp
+#   the room. Take the smallest dictionary that suffices and ignore numbers that were not handed
+#   out.
+# Source:
+#   https://github.com/opencv/opencv/blob/5.x/modules/objdetect/src/aruco/predefined_dictionaries.hpp
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

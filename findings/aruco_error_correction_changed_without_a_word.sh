@@ -1,13 +1,15 @@
 # opencv-python-headless 4.12.0.88 and 5.0.0.93: AprilTags had no error correction and ARUCO_MIP_36H12 far too much; now both have five bits
 #
-# Behaviour: in 4.12 an AprilTag 36h11 with one wrong cell is not found at all, while DICT_ARUCO_MIP_36H12
-#   accepts 7 wrong cells of 36 and so reads 57 of 250 markers of 4x4_1000 as its own. In 5.0
-#   AprilTags with up to 3 wrong cells are found and MIP_36H12 reads none of the foreign ones.
+# Behaviour: in 4.12 an AprilTag 36h11 with one wrong cell is not found at all, while
+#   DICT_ARUCO_MIP_36H12 accepts 7 wrong cells of 36 and so reads 57 of 250 markers of 4x4_1000 as
+#   its own. In 5.0 AprilTags with up to 3 wrong cells are found and MIP_36H12 reads none of the
+#   foreign ones.
 # Guess: the dictionary with the largest distance is the safest one, and a detector of the same name
 #   with the same parameters finds the same markers after an upgrade.
 # So: detections in old and new films of the same scene are not comparable: say which OpenCV read
 #   them. With 4.12, avoid MIP_36H12 beside other tags and expect dirty AprilTags to vanish.
-# Source: https://github.com/opencv/opencv/pull/29034 ("fix maxCorrectionBits in predefined dictionaries")
+# Source: https://github.com/opencv/opencv/pull/29034 ("fix maxCorrectionBits in predefined
+#   dictionaries")
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

@@ -1,12 +1,11 @@
 # opencv-python-headless 4.12.0.88 and 5.0.0.93: detectMarkers returns ids as a column in OpenCV 4 and as a flat array in OpenCV 5
 #
-# Behaviour: three markers in one picture give ids of shape (3, 1) in 4.12 and (3,) in 5.0, while the
-#   corners keep their shape (1, 4, 2). The usual "for i, in ids" or ids[k][0] works in 4 and raises in
-#   5; "for i in ids: seen[i]" works in 5 and raises in 4, since an array cannot be a key.
+# Behaviour: three markers in one picture give ids of shape (3, 1) in 4.12 and (3,) in 5.0, while
+#   the corners keep their shape (1, 4, 2). The usual "for i, in ids" or ids[k][0] works in 4 and
+#   raises in 5; "for i in ids: seen[i]" works in 5 and raises in 4, since an array cannot be a key.
 # Guess: the detector's results have one shape across versions, or all of them change alike.
 # So: take numpy.ravel(ids), which reads both, and treat None (no marker) apart.
-# Source: one-dimensional arrays in OpenCV 5, https://github.com/opencv/opencv/wiki/OpenCV-5;
-#   https://docs.opencv.org/5.x/d2/d1a/classcv_1_1aruco_1_1ArucoDetector.html
+# Source: https://github.com/opencv/opencv-python/issues/1185 (reported for 4.13.0.90 already)
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

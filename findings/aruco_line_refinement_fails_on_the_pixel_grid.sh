@@ -2,9 +2,9 @@
 #
 # Behaviour: with CORNER_REFINE_CONTOUR or CORNER_REFINE_APRILTAG the centre of a marker moved by
 #   parts of a pixel scatters by 0.01 px when the marker is turned by 10 degrees, and by 0.2 px or
-#   more when its sides run along the rows and columns: there it jumps in whole pixels. At 10 degrees
-#   CONTOUR also makes the marker 1 px smaller than it is, and APRILTAG puts all of it half a
-#   pixel too far right and down; CORNER_REFINE_SUBPIX does neither.
+#   more when its sides run along the rows and columns: there it jumps in whole pixels. At 10
+#   degrees CONTOUR also makes the marker 1 px smaller than it is, and APRILTAG puts all of it half
+#   a pixel too far right and down; CORNER_REFINE_SUBPIX does neither.
 # Guess: an axis-aligned marker is the easiest case, and line fitting the finest method.
 # So: turn the markers, or the camera, by some degrees, or refine by CORNER_REFINE_SUBPIX, which
 #   stays below 0.05 px at every angle. Do not mix films read with different refinements.

@@ -1,12 +1,13 @@
 # av 18.1.0, opencv-python-headless 5.0.0.93: an AVI with uneven frame times announces thousands of frames for sixty
 #
-# Behaviour: 60 Motion JPEG frames with times in milliseconds, 17 to 50 ms apart, are muxed into AVI.
-#   The file announces one frame for each millisecond, about 2,000, and 1,000 frames a second, in PyAV
-#   and OpenCV alike; 60 are decoded, with the right times. AVI has one constant rate, and the gaps are filled
-#   with empty chunks that count.
+# Behaviour: 60 Motion JPEG frames with times in milliseconds, 17 to 50 ms apart, are muxed into
+#   AVI. The file announces one frame for each millisecond, about 2,000, and 1,000 frames a second,
+#   in PyAV and OpenCV alike; 60 are decoded, with the right times. AVI has one constant rate, and
+#   the gaps are filled with empty chunks that count.
 # Guess: an AVI holds constant-rate film only, so either the times or the muxing would be refused.
 # So: neither the count nor the rate of an AVI may be used for times; take the frames' own times.
-# Source: empty packets for skipped frames, in https://github.com/FFmpeg/FFmpeg/blob/master/libavformat/avienc.c
+# Source: empty packets for skipped frames, in
+#   https://github.com/FFmpeg/FFmpeg/blob/master/libavformat/avienc.c
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

@@ -1,9 +1,9 @@
 # ezc3d 1.7.2, c3d 0.6.0, numpy 2.4.6: a C3D file of 70,000 frames is read as 65,535, as none or as 70,016, and nothing is raised
 #
-# Behaviour: 70,000 frames at 100 Hz (under 12 minutes). Written by ezc3d: ezc3d reads 65,535 of them
-#   back; the c3d package announces 65,535 and gives 0, with a warning. Written by the c3d package: it reads its own
-#   70,000, ezc3d reads 70,016, the last 16 being the padding of the file's last block as points.
-#   40,000 frames are read right by all.
+# Behaviour: 70,000 frames at 100 Hz (under 12 minutes). Written by ezc3d: ezc3d reads 65,535 of
+#   them back; the c3d package announces 65,535 and gives 0, with a warning. Written by the c3d
+#   package: it reads its own 70,000, ezc3d reads 70,016, the last 16 being the padding of the
+#   file's last block as points. 40,000 frames are read right by all.
 # Guess: the number of frames is stored, and a format of motion capture holds an hour.
 # So: check the number of frames that come out against duration times rate, in both directions; save
 #   recordings longer than 65,535 frames in pieces.

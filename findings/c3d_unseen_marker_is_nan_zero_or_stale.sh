@@ -1,14 +1,15 @@
 # ezc3d 1.7.2, c3d 0.6.0, numpy 2.4.6: two C3D libraries write an unseen marker in two ways, and each hides the other's
 #
-# Behaviour: ezc3d writes a marker set to NaN as NaN with residual 0, which the format reserves for a
-#   seen one; the c3d package reads that as (0, 0, 0) with residual -1. The c3d package itself writes an unseen
-#   marker (residual -1) with the coordinates of its last seen frame, whatever coordinates it was
-#   given, and reads them back so: the marker seems to stand still. ezc3d reads that as NaN.
+# Behaviour: ezc3d writes a marker set to NaN as NaN with residual 0, which the format reserves for
+#   a seen one; the c3d package reads that as (0, 0, 0) with residual -1. The c3d package itself
+#   writes an unseen marker (residual -1) with the coordinates of its last seen frame, whatever
+#   coordinates it was given, and reads them back so: the marker seems to stand still. ezc3d reads
+#   that as NaN.
 # Guess: an unseen marker is one thing in the file, residual -1 at (0, 0, 0), and both agree on it.
-# So: count a marker as unseen if its residual is negative or any coordinate is NaN. A test
-#   for zeros or for NaN alone misses one writer, and the stale one moves in no test for zeros.
+# So: count a marker as unseen if its residual is negative or any coordinate is NaN. A test for
+#   zeros or for NaN alone misses one writer, and the stale one moves in no test for zeros.
 # Source: https://github.com/EmbodiedCognition/py-c3d (c3d/c3d.py, Writer.write_frames),
-#   https://github.com/pyomeca/ezc3d; the format: https://www.c3d.org/HTML/Documents/residual1.htm
+#   https://github.com/pyomeca/ezc3d; the format: https://www.c3d.org
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

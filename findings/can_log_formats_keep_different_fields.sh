@@ -1,12 +1,13 @@
 # python-can 4.6.1: the ending of a CAN log's name decides which of time, direction, channel and error frames survive
 #
-# Behaviour: six messages, one of them an error frame and two sent by the logger itself, are written and read back
-#   through can.Logger and can.LogReader. .asc comes back with times from 0 instead of the clock's; .csv and .db
-#   lose the channel and whether a frame was sent or received; .trc drops the error frame and gives
-#   channel 2 for 1; .log gives the channel as text. Only .blf returns all.
+# Behaviour: six messages, one of them an error frame and two sent by the logger itself, are written
+#   and read back through can.Logger and can.LogReader. .asc comes back with times from 0 instead of
+#   the clock's; .csv and .db lose the channel and whether a frame was sent or received; .trc drops
+#   the error frame and gives channel 2 for 1; .log gives the channel as text. Only .blf returns
+#   all.
 # Guess: the formats differ in size and speed, and times at least are common to all.
-# So: a recording to be set against a film must not be .asc, and one whose own commands must be told from
-#   the robot's answers must not be .csv or .db. Record .blf.
+# So: a recording to be set against a film must not be .asc, and one whose own commands must be told
+#   from the robot's answers must not be .csv or .db. Record .blf.
 # Source: https://python-can.readthedocs.io/en/stable/file_io.html and
 #   https://github.com/hardbyte/python-can/tree/main/can/io (ASCReader: relative_timestamp)
 set -euo pipefail

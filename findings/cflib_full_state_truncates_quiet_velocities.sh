@@ -1,11 +1,12 @@
 # cflib 0.1.34, numpy 2.4.6: a Crazyflie's full state setpoint cuts velocities to whole millimetres per second, towards zero
 #
-# Behaviour: send_full_state_setpoint packs position, velocity and acceleration as int(1000 * x). A sine of
-#   20 mm/s keeps 97 % of its size on the wire, one of 5 mm/s 84 %, one of 2 mm/s 56 % and one of 1 mm/s nothing;
-#   there is a dead zone of 2 mm/s round zero. The hover and velocity setpoints send 32-bit floats.
+# Behaviour: send_full_state_setpoint packs position, velocity and acceleration as int(1000 * x). A
+#   sine of 20 mm/s keeps 97 % of its size on the wire, one of 5 mm/s 84 %, one of 2 mm/s 56 % and
+#   one of 1 mm/s nothing; there is a dead zone of 2 mm/s round zero. The hover and velocity
+#   setpoints send 32-bit floats.
 # Guess: all setpoints carry floats, or round to the nearest step, which would keep small sines.
-# So: a quiet message added to the velocity is distorted before it leaves the computer, the more
-#   the quieter it is. Send velocity or hover setpoints, or dither.
+# So: a quiet message added to the velocity is distorted before it leaves the computer, the more the
+#   quieter it is. Send velocity or hover setpoints, or dither.
 # Source: https://github.com/bitcraze/crazyflie-lib-python/blob/master/cflib/crazyflie/commander.py
 set -euo pipefail
 tmp=$(mktemp -d)

@@ -1,14 +1,16 @@
 # cflib 0.1.34: a Crazyflie's setpoints turn pitch round in two calls of three, and "degrees/s" of one of them is read as radians/s
 #
-# Behaviour: send_setpoint and send_setpoint_manual put -pitch on the wire, send_zdistance_setpoint puts
-#   pitch, with the same argument name and unit. send_full_state_setpoint documents rates in
-#   degrees/s but sends 1000 times the number in 16 bits; the firmware reads that as milliradians/s, so 30
-#   means 30 rad/s, and 40 cannot be packed.
+# Behaviour: send_setpoint and send_setpoint_manual put -pitch on the wire, send_zdistance_setpoint
+#   puts pitch, with the same argument name and unit. send_full_state_setpoint documents rates in
+#   degrees/s but sends 1000 times the number in 16 bits; the firmware reads that as milliradians/s,
+#   so 30 means 30 rad/s, and 40 cannot be packed.
 # Guess: one commander has one convention for pitch and for rates.
-# So: a robot changed from one setpoint to another pitches the other way, and a yaw rate given in degrees is 57 times too fast. Test
-#   sign and size of each axis for the one call that is used; give full-state rates in radians/s.
-# Source: https://github.com/bitcraze/crazyflie-lib-python/blob/master/cflib/crazyflie/commander.py and, for
-#   fullStatePacket_s, https://github.com/bitcraze/crazyflie-firmware/blob/master/src/modules/src/crtp_commander_generic.c
+# So: a robot changed from one setpoint to another pitches the other way, and a yaw rate given in
+#   degrees is 57 times too fast. Test sign and size of each axis for the one call that is used;
+#   give full-state rates in radians/s.
+# Source: https://github.com/bitcraze/crazyflie-lib-python/blob/master/cflib/crazyflie/commander.py
+#   and, for fullStatePacket_s,
+#   https://github.com/bitcraze/crazyflie-firmware/blob/master/src/modules/src/crtp_commander_generic.c
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

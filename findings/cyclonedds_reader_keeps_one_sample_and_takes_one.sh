@@ -1,9 +1,11 @@
 # cyclonedds 11.0.1: a CycloneDDS reader keeps only the newest sample, is best effort, and take() hands out one at a time
 #
-# Behaviour: 100 samples are written in a burst. A DataReader with default QoS holds 1 of them, the last; with
-#   History.KeepAll it holds all, but take() without an argument returns a list of one, so a loop that takes
-#   once a tick falls further and further behind. The default reader asks for best effort, the default writer offers reliable.
-# Guess: from ROS 2, whose default is a reliable queue of 10: nothing is lost at this pace, and take() takes all.
+# Behaviour: 100 samples are written in a burst. A DataReader with default QoS holds 1 of them, the
+#   last; with History.KeepAll it holds all, but take() without an argument returns a list of one,
+#   so a loop that takes once a tick falls further and further behind. The default reader asks for
+#   best effort, the default writer offers reliable.
+# Guess: from ROS 2, whose default is a reliable queue of 10: nothing is lost at this pace, and
+#   take() takes all.
 # So: state History and Reliability on both sides, and take(n) with n above what a tick can bring.
 # Source: https://cyclonedds.io/docs/cyclonedds-python/latest/ (Qos, DataReader.take: N = 1)
 set -euo pipefail

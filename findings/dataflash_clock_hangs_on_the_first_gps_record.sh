@@ -1,8 +1,9 @@
 # pymavlink 2.4.50: one late first GPS record shifts every time of an ArduPilot DataFlash log
 #
 # Behaviour: DFReader takes the difference between GPS time and the board's TimeUS from the first
-#   usable GPS record alone. If that record was logged 300 ms after the fix it holds (start-up is when
-#   the logger is busiest), the whole log is 300 ms early, and every later record that would tell is ignored.
+#   usable GPS record alone. If that record was logged 300 ms after the fix it holds (start-up is
+#   when the logger is busiest), the whole log is 300 ms early, and every later record that would
+#   tell is ignored.
 # Guess: the clock is fitted over all GPS records, or at least checked against them.
 # So: times of a log and of a film or a motion capture system disagree by a constant that changes
 #   with each start of the robot. Fit the median of GPS time minus TimeUS yourself.

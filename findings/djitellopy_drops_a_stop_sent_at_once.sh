@@ -6,8 +6,8 @@
 # Guess: commands faster than the limit are delayed or merged, the newest wins, or the call says so.
 # So: a burst that corrects itself (set, clip, stop) ends in its first value. Send once a tick, and
 #   repeat a stop.
-# Source: https://github.com/damiafuentes/DJITelloPy/blob/master/djitellopy/tello.py (send_rc_control,
-#   TIME_BTW_RC_CONTROL_COMMANDS)
+# Source: https://github.com/damiafuentes/DJITelloPy/blob/master/djitellopy/tello.py
+#   (send_rc_control, TIME_BTW_RC_CONTROL_COMMANDS)
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

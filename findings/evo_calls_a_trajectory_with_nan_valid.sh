@@ -1,12 +1,14 @@
 # evo 1.38.1, numpy 2.4.6: one NaN line makes every statistic of evo NaN, after its own check called the trajectory valid
 #
-# Behaviour: a TUM file in which a motion capture system wrote "nan" for one lost frame of 20 is read with
-#   20 poses. trajectory.check() reports True and "ok" for each item. The absolute error's mean, rmse
-#   and even median and min are NaN, and align() raises LinAlgError: SVD did not converge.
-# Guess: the reader drops or refuses such lines, check() finds them, and a median survives one of them.
+# Behaviour: a TUM file in which a motion capture system wrote "nan" for one lost frame of 20 is
+#   read with 20 poses. trajectory.check() reports True and "ok" for each item. The absolute error's
+#   mean, rmse and even median and min are NaN, and align() raises LinAlgError: SVD did not
+#   converge.
+# Guess: the reader drops or refuses such lines, check() finds them, and a median survives one of
+#   them.
 # So: drop lines with NaN before evo sees them, and say how many.
-# Source: https://github.com/MichaelGrupp/evo/blob/master/evo/core/trajectory.py (PoseTrajectory3D.check),
-#   https://github.com/MichaelGrupp/evo/wiki/Formats
+# Source: https://github.com/MichaelGrupp/evo/blob/master/evo/core/trajectory.py
+#   (PoseTrajectory3D.check), https://github.com/MichaelGrupp/evo/wiki/Formats
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

@@ -1,12 +1,13 @@
 # gymnasium 1.4.0, numpy 2.4.6: in a vector environment the step after an episode's end only resets and drops its action
 #
 # Behaviour: one environment whose episodes last 10 steps, in SyncVectorEnv with default settings.
-#   Of 110 calls of step only 100 reach the environment; the 11th, 22nd, ... return the new episode's
-#   first observation with reward 0, and their actions are lost. With AutoresetMode.SAME_STEP all 110
-#   reach it, but the last observation of each episode is replaced by the first of the next.
+#   Of 110 calls of step only 100 reach the environment; the 11th, 22nd, ... return the new
+#   episode's first observation with reward 0, and their actions are lost. With
+#   AutoresetMode.SAME_STEP all 110 reach it, but the last observation of each episode is replaced
+#   by the first of the next.
 # Guess: as before version 1.0, a step is a step and the reset happens within the step that ends.
-# So: a message of one symbol a tick slips by one tick at each end. Count ticks by the environment's own time,
-#   never by calls.
+# So: a message of one symbol a tick slips by one tick at each end. Count ticks by the environment's
+#   own time, never by calls.
 # Source: https://gymnasium.farama.org/main/api/vector/autoreset/
 set -euo pipefail
 tmp=$(mktemp -d)

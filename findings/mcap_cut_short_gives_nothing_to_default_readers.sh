@@ -1,8 +1,9 @@
 # mcap 1.6.0: of an MCAP that lost its end, both readers give no message at all by default, though thousands are whole
 #
-# Behaviour: a recording of 40,000 poses is cut at 60 % of its bytes, as when a robot's battery ends. make_reader
-#   and NonSeekingReader raise before the first message. NonSeekingReader with log_time_order=False
-#   gives over 17,000 messages, in order, before it raises: everything in the whole chunks.
+# Behaviour: a recording of 40,000 poses is cut at 60 % of its bytes, as when a robot's battery
+#   ends. make_reader and NonSeekingReader raise before the first message. NonSeekingReader with
+#   log_time_order=False gives over 17,000 messages, in order, before it raises: everything in the
+#   whole chunks.
 # Guess: a reader that needs no index streams what is there and stops at the damage.
 # So: catch the error and fall back to log_time_order=False, count what came, and say how much of
 #   the time is missing.

@@ -1,11 +1,11 @@
 # opencv-python-headless 4.12.0.88 and 5.0.0.93: minAreaRect gives one robot another angle and swapped sides after the upgrade
 #
-# Behaviour: for one rectangle of 100 x 50 turned by 30 degrees OpenCV 4.12 gives sides (100, 50) and
-#   30 degrees, OpenCV 5.0 sides (50, 100) and -60. 4.12 counts in (0, 90], 5.0 in [-90, 0) as before
-#   4.5.1. An unturned rectangle is 90 in one and -90 in the other, never 0.
+# Behaviour: for one rectangle of 100 x 50 turned by 30 degrees OpenCV 4.12 gives sides (100, 50)
+#   and 30 degrees, OpenCV 5.0 sides (50, 100) and -60. 4.12 counts in (0, 90], 5.0 in [-90, 0) as
+#   before 4.5.1. An unturned rectangle is 90 in one and -90 in the other, never 0.
 # Guess: an angle's convention is fixed within a library, at least since it was changed in 4.5.1.
-# So: a heading taken from the angle jumps by a quarter turn with the installed version. Take the direction
-#   of the longer side from boxPoints, which is the same in both.
+# So: a heading taken from the angle jumps by a quarter turn with the installed version. Take the
+#   direction of the longer side from boxPoints, which is the same in both.
 # Source: https://github.com/opencv/opencv/pull/28051 ("Correct minAreaRect angle to be in range
 #   [-90, 0)"), https://github.com/opencv/opencv/issues/19472
 set -euo pipefail

@@ -1,14 +1,14 @@
 # av 18.1.0, opencv-python-headless 5.0.0.93, imageio-ffmpeg 0.8.1: an MP4 cut without re-encoding announces frames that no player shows
 #
-# Behaviour: 240 frames at 30 fps with a key frame every 60 are cut at 2.5 s by "ffmpeg -ss 2.5 -c copy".
-#   The new file announces 180 frames (PyAV and OpenCV alike), but 165 are decoded: the 15 from the
-#   last key frame to the cut lie in the file and an edit list hides them. The
-#   packets' times start before zero, and reading packets instead of frames gives them all.
+# Behaviour: 240 frames at 30 fps with a key frame every 60 are cut at 2.5 s by "ffmpeg -ss 2.5 -c
+#   copy". The new file announces 180 frames (PyAV and OpenCV alike), but 165 are decoded: the 15
+#   from the last key frame to the cut lie in the file and an edit list hides them. The packets'
+#   times start before zero, and reading packets instead of frames gives them all.
 # Guess: the frame count of a clean, untouched MP4 header is the number of frames that come out.
 # So: never allot or judge by the announced count ("frames are missing, the film is damaged"), and
 #   never number the packets of such a file as if they were frames.
-# Source: https://trac.ffmpeg.org/wiki/Seeking ("Seeking while doing a codec copy") and the edit list
-#   handling in https://github.com/FFmpeg/FFmpeg/blob/master/libavformat/mov.c
+# Source: https://trac.ffmpeg.org/wiki/Seeking ("Seeking while doing a codec copy") and the edit
+#   list handling in https://github.com/FFmpeg/FFmpeg/blob/master/libavformat/mov.c
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

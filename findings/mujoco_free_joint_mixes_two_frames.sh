@@ -1,12 +1,12 @@
 # mujoco 4.0.0, numpy 2.4.6: of a free joint's six velocities three are in the world's frame and three in the body's own
 #
-# Behaviour: a free body rolled by 90 degrees about x, with qvel = (0.3, 0, 0, 0, 0, 1). The first three are
-#   the velocity in the world, the last three the angular velocity in the body's axes: 1 rad/s "about z"
-#   turns about the world's -y. cvel holds angular before linear, and its linear part is the velocity of the tree's
-#   centre of mass, not of the body's origin.
+# Behaviour: a free body rolled by 90 degrees about x, with qvel = (0.3, 0, 0, 0, 0, 1). The first
+#   three are the velocity in the world, the last three the angular velocity in the body's axes: 1
+#   rad/s "about z" turns about the world's -y. cvel holds angular before linear, and its linear
+#   part is the velocity of the tree's centre of mass, not of the body's origin.
 # Guess: one vector has one frame, and cvel of a body is the body's velocity.
-# So: take velocities from mj_objectVelocity with a stated frame. The yaw rate of a robot that leans is not
-#   qvel[5].
+# So: take velocities from mj_objectVelocity with a stated frame. The yaw rate of a robot that leans
+#   is not qvel[5].
 # Source: https://mujoco.readthedocs.io/en/stable/overview.html#floating-objects and
 #   https://mujoco.readthedocs.io/en/stable/APIreference/APItypes.html#mjdata (cvel)
 set -euo pipefail

@@ -1,11 +1,11 @@
 # mujoco 4.0.0, numpy 2.4.6: after mj_step, body positions, sensors and velocities are one step older than qpos and time
 #
-# Behaviour: a body glides at 1 m/s with steps of 20 ms. After each mj_step qpos is where the body is
-#   at data.time, while xpos and a framepos sensor still give the place of one step before: 2 cm back. After
-#   mj_forward all agree.
+# Behaviour: a body glides at 1 m/s with steps of 20 ms. After each mj_step qpos is where the body
+#   is at data.time, while xpos and a framepos sensor still give the place of one step before: 2 cm
+#   back. After mj_forward all agree.
 # Guess: one step leaves one consistent state, stamped with data.time.
-# So: a recording that pairs xpos or sensors with data.time carries a delay of one step, 36 degrees of phase at 5 Hz
-#   with 20 ms. Record qpos, or call mj_forward before recording.
+# So: a recording that pairs xpos or sensors with data.time carries a delay of one step, 36 degrees
+#   of phase at 5 Hz with 20 ms. Record qpos, or call mj_forward before recording.
 # Source: https://github.com/google-deepmind/mujoco/issues/498 and
 #   https://mujoco.readthedocs.io/en/stable/programming/simulation.html#simulation-loop
 set -euo pipefail

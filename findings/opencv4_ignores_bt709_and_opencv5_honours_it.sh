@@ -1,13 +1,14 @@
 # opencv-python-headless 4.12.0.88 and 5.0.0.93, av 18.1.0: the same BT.709 film has other colours in OpenCV 4 than in OpenCV 5
 #
-# Behaviour: one plain colour is coded as H.264 with BT.709 and tagged so, as most HD cameras do. OpenCV 4.12's VideoCapture
-#   decodes it as BT.601: red 200 reads 187, green 60 reads 45. OpenCV 5.0 honours the tag and is
-#   within 3 of the truth, as is PyAV in both. A film tagged BT.601 is right everywhere.
+# Behaviour: one plain colour is coded as H.264 with BT.709 and tagged so, as most HD cameras do.
+#   OpenCV 4.12's VideoCapture decodes it as BT.601: red 200 reads 187, green 60 reads 45. OpenCV
+#   5.0 honours the tag and is within 3 of the truth, as is PyAV in both. A film tagged BT.601 is
+#   right everywhere.
 # Guess: VideoCapture gives the film's colours; an upgrade changes speed, not pixels.
 # So: a colour threshold tuned under OpenCV 4, or with PyAV, does not fit the other one. Say with
 #   which version colours were chosen, and leave room of 15 levels.
-# Source: https://github.com/opencv/opencv/blob/5.x/modules/videoio/src/cap_ffmpeg_impl.hpp (conversion by
-#   swscale, with or without sws_setColorspaceDetails)
+# Source: https://github.com/opencv/opencv/issues/20513 (VideoCapture ignores BT.709) and
+#   https://github.com/opencv/opencv/pull/24290
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

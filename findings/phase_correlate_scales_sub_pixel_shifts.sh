@@ -1,7 +1,7 @@
 # opencv-python-headless 5.0.0.93, numpy 2.4.6: phaseCorrelate scales sub-pixel shifts by 0.8 to 1.35
 #
-# Behaviour: cv2.phaseCorrelate is right for whole pixels, but a shift of a quarter pixel comes
-#   out as anything from 0.8 to 1.35 of itself (and as nothing in a noise-free picture without a
+# Behaviour: cv2.phaseCorrelate is right for whole pixels, but a shift of a quarter pixel comes out
+#   as anything from 0.8 to 1.35 of itself (and as nothing in a noise-free picture without a
 #   window), depending on how smooth and how noisy the picture is. The scale is systematic:
 #   averaging over frames keeps it.
 # Guess: a phase method is unbiased, noise only adds scatter, and a window only helps.

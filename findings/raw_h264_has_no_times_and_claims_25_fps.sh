@@ -1,14 +1,14 @@
 # av 18.1.0, opencv-python-headless 5.0.0.93: a raw H.264 file has no times, says 25 frames a second, and OpenCV announces minus 1.9e14 frames
 #
-# Behaviour: 100 frames encoded at 60 fps into a bare .h264 stream, as single-board cameras write it.
-#   PyAV gives every frame the time None and the average rate 25; OpenCV gives 25 fps, a frame count of
-#   about -192,153,584,101,141 and a position of 0 ms after every frame. The true 60 fps stand in
-#   the stream and PyAV's guessed_rate knows them.
+# Behaviour: 100 frames encoded at 60 fps into a bare .h264 stream, as single-board cameras write
+#   it. PyAV gives every frame the time None and the average rate 25; OpenCV gives 25 fps, a frame
+#   count of about -192,153,584,101,141 and a position of 0 ms after every frame. The true 60 fps
+#   stand in the stream and PyAV's guessed_rate knows them.
 # Guess: a rate that is reported was read from the file; a count is missing as 0 or -1.
-# So: motion at 3 Hz in such a film looks like 1.25 Hz. Ask for the rate, or take guessed_rate; treat
-#   25 from a file without times as unknown, and a negative count likewise.
+# So: motion at 3 Hz in such a film looks like 1.25 Hz. Ask for the rate, or take guessed_rate;
+#   treat 25 from a file without times as unknown, and a negative count likewise.
 # Source: default of the option framerate of the raw video demuxers, "25", in
-#   https://github.com/FFmpeg/FFmpeg/blob/master/libavformat/rawdec.h and
+#   https://github.com/FFmpeg/FFmpeg/blob/master/libavformat/rawdec.c and
 #   https://ffmpeg.org/ffmpeg-formats.html#rawvideo
 set -euo pipefail
 tmp=$(mktemp -d)

@@ -1,11 +1,12 @@
 # python-can 4.6.1, pyserial 3.5: slcan sends an error frame as a data frame of identifier 0 and gives no error frames back
 #
-# Behaviour: a recording with error frames is replayed through the slcan interface. The line protocol
-#   has no error frames; python-can does not refuse them but writes "T000000000" for the default Message(is_error_frame=True), a valid
-#   extended data frame with identifier 0, the highest priority on the bus. Read back, it is a data frame.
+# Behaviour: a recording with error frames is replayed through the slcan interface. The line
+#   protocol has no error frames; python-can does not refuse them but writes "T000000000" for the
+#   default Message(is_error_frame=True), a valid extended data frame with identifier 0, the highest
+#   priority on the bus. Read back, it is a data frame.
 # Guess: what an interface cannot send it refuses, as it refuses other impossible things.
-# So: filter error frames out before replaying a log; on a real bus such a frame wins every arbitration, and a
-#   receiver may take it for a command.
+# So: filter error frames out before replaying a log; on a real bus such a frame wins every
+#   arbitration, and a receiver may take it for a command.
 # Source: https://github.com/hardbyte/python-can/blob/main/can/interfaces/slcan.py (send)
 set -euo pipefail
 tmp=$(mktemp -d)

@@ -8,7 +8,7 @@
 # So: amplitudes must not be compared across films, sizes or frequencies; "no motion seen" in a
 #   compressed film says nothing below some tenths of a pixel. Record at CRF 18 or better.
 # Source: quality is decided per block by rate against distortion, see Rate control and the options
-#   crf, deadzone and mbtree of libx264 in https://ffmpeg.org/ffmpeg-codecs.html and
+#   crf and mbtree of libx264 in https://ffmpeg.org/ffmpeg-codecs.html and
 #   https://trac.ffmpeg.org/wiki/Encode/H.264
 set -euo pipefail
 tmp=$(mktemp -d)

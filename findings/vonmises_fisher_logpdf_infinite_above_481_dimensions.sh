@@ -1,11 +1,12 @@
 # scipy 1.17.1, numpy 2.4.6: vonmises_fisher.logpdf is plus infinity from dimension 482 on, so wrong evidence wins
 #
-# Behaviour: with kappa 10 the log density at the mean direction is 810.17 in 481 dimensions and +inf in 482,
-#   entropy is -800.17 and then nan. With kappa 100 it goes on to 600 dimensions and is +inf at 1200. Only a
-#   warning about a division by zero is given. The true values are finite and smooth.
+# Behaviour: with kappa 10 the log density at the mean direction is 810.17 in 481 dimensions and
+#   +inf in 482, entropy is -800.17 and then nan. With kappa 100 it goes on to 600 dimensions and is
+#   +inf at 1200. Only a warning about a division by zero is given. The true values are finite and
+#   smooth.
 # Guess: a density in logarithms is safe from underflow.
-# So: +inf evidence beats every honest alternative. For directions of long windows (a message of
-#   500 samples is one) compute the normaliser by the series in logarithms or a uniform expansion.
+# So: +inf evidence beats every honest alternative. For directions of long windows (a message of 500
+#   samples is one) compute the normaliser by the series in logarithms or a uniform expansion.
 # Source: log(ive(dim / 2 - 1, kappa)) with ive underflowing to 0, in
 #   https://github.com/scipy/scipy/blob/main/scipy/stats/_multivariate.py (vonmises_fisher_gen)
 set -euo pipefail

@@ -1,14 +1,14 @@
 # av 18.1.0, numpy 2.4.6: x264 shows slow small motion tens of milliseconds late, though every frame time is exact
 #
 # Behaviour: a disc swings by 0.1 px rms at 1 Hz. At CRF 18 the motion in the decoded film lags the
-#   truth by about 30 ms, at CRF 23 by 70 ms or more, while the 240 frames carry exact times.
-#   A swing of 3 px in the same film is on time. Blocks stay as they were until
-#   the change is worth its bits, so the picture follows late.
+#   truth by about 30 ms, at CRF 23 by 70 ms or more, while the 240 frames carry exact times. A
+#   swing of 3 px in the same film is on time. Blocks stay as they were until the change is worth
+#   its bits, so the picture follows late.
 # Guess: a codec may blur, but what a frame with time t shows is what happened at t.
 # So: a delay fitted between commands and film belongs to that film's codec, quality and amplitude.
 #   Never carry it over to another film, and never read it as the robot's own delay.
-# Source: skipped blocks and mbtree in libx264, https://code.videolan.org/videolan/x264 (encoder/slicetype.c,
-#   encoder/analyse.c); options in https://ffmpeg.org/ffmpeg-codecs.html
+# Source: skipped blocks and mbtree in libx264, https://code.videolan.org/videolan/x264
+#   (encoder/slicetype.c, encoder/analyse.c); options in https://ffmpeg.org/ffmpeg-codecs.html
 set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT

@@ -1,8 +1,8 @@
 # av 18.1.0, numpy 2.4.6: after x264 a still object's measured noise is as large as before but lies below 1 Hz
 #
 # Behaviour: a still disc, filmed with white sensor noise, is located with white scatter. After x264
-#   at CRF 23 the scatter has one to two times that rms, but over 90 % of its power lies below 1 Hz instead
-#   of 6 %, and frame-to-frame differences show a quarter of it or less.
+#   at CRF 23 the scatter has one to two times that rms, but over 90 % of its power lies below 1 Hz
+#   instead of 6 %, and frame-to-frame differences show a quarter of it or less.
 # Guess: an encoder adds or removes noise, and what is left is about white; differences of
 #   neighbouring frames tell its size.
 # So: noise estimated from frame differences is several times too small on coded film, and slow
