@@ -10,9 +10,9 @@ set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 cd "$tmp"
-for v in old new; do python3 -m venv $v; done
-old/bin/pip install --quiet --disable-pip-version-check --no-compile opencv-python-headless==4.12.0.88
-new/bin/pip install --quiet --disable-pip-version-check --no-compile opencv-python-headless==5.0.0.93
+python3 -m venv venv
+venv/bin/pip install --quiet --disable-pip-version-check --no-compile --target old opencv-python-headless==4.12.0.88 numpy==2.2.6
+venv/bin/pip install --quiet --disable-pip-version-check --no-compile --target new opencv-python-headless==5.0.0.93 numpy==2.4.6
 cat > ids.py <<'END'
 import cv2, numpy as np
 dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
@@ -28,8 +28,8 @@ def works(use):
 print(f"{cv2.__version__.split('.')[0]}: ids {ids.shape}, corners {corners[0].shape}, ids[0][0] {works(lambda: ids[0][0])}, "
       f"as a key {works(lambda: {i: 1 for i in ids})}, ravel {sorted(np.ravel(ids).tolist())}")
 END
-old/bin/python ids.py | tee seen
-new/bin/python ids.py | tee -a seen
+PYTHONPATH=old venv/bin/python ids.py | tee seen
+PYTHONPATH=new venv/bin/python ids.py | tee -a seen
 diff seen - <<'END'
 4: ids (3, 1), corners (1, 4, 2), ids[0][0] works, as a key TypeError, ravel [3, 5, 7]
 5: ids (3,), corners (1, 4, 2), ids[0][0] IndexError, as a key works, ravel [3, 5, 7]

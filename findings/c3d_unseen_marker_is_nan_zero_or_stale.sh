@@ -6,8 +6,8 @@
 #   coordinates it was given, and reads them back so: the marker seems to stand still. ezc3d reads
 #   that as NaN.
 # Guess: an unseen marker is one thing in the file, residual -1 at (0, 0, 0), and both agree on it.
-# So: count a marker as unseen if its residual is negative or any coordinate is NaN. A test for
-#   zeros or for NaN alone misses one writer, and the stale one moves in no test for zeros.
+# So: count a marker as unseen if its residual is negative or any coordinate is NaN. A test for NaN
+#   alone or for zeros alone misses one of the writers, and the stale marker passes both.
 # Source: https://github.com/EmbodiedCognition/py-c3d (c3d/c3d.py, Writer.write_frames),
 #   https://github.com/pyomeca/ezc3d; the format: https://www.c3d.org
 set -euo pipefail

@@ -4,8 +4,8 @@
 #   averages to 1.15-1.4 times the truth at 0.1 pixel, more so in a noisier picture. The mean over
 #   the whole field carries the error, so no averaging removes it.
 # Guess: dense flow shrinks small motion, if anything, and the mean of 40,000 vectors is exact.
-# So: amplitudes from DIS depend on the amplitude itself. Farneback and Lucas-Kanade stay within 7 %
-#   on the same pictures; measure small motion with one of them.
+# So: amplitudes from DIS depend on the amplitude itself. Farneback stays within 7 % on the same
+#   pictures; measure small motion with it or with Lucas-Kanade.
 # Source: https://github.com/opencv/opencv/blob/5.x/modules/video/src/dis_flow.cpp (inverse search
 #   on patches, then variational refinement); T. Kroeger et al., Fast Optical Flow using Dense
 #   Inverse Search, https://arxiv.org/abs/1603.03590

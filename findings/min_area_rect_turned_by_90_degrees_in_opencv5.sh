@@ -12,9 +12,9 @@ set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 cd "$tmp"
-for v in old new; do python3 -m venv $v; done
-old/bin/pip install --quiet --disable-pip-version-check --no-compile opencv-python-headless==4.12.0.88
-new/bin/pip install --quiet --disable-pip-version-check --no-compile opencv-python-headless==5.0.0.93
+python3 -m venv venv
+venv/bin/pip install --quiet --disable-pip-version-check --no-compile --target old opencv-python-headless==4.12.0.88 numpy==2.2.6
+venv/bin/pip install --quiet --disable-pip-version-check --no-compile --target new opencv-python-headless==5.0.0.93 numpy==2.4.6
 cat > angle.py <<'END'
 import cv2, numpy as np
 def rectangle(degrees):
@@ -29,13 +29,13 @@ for degrees in (0, 30, 60):
     print(f"turned by {degrees}: sides {round(sides[0])} x {round(sides[1])}, angle {round(angle)}, "
           f"longer side of boxPoints {round(np.rad2deg(np.arctan2(y, x))) % 180}")
 END
-old/bin/python angle.py | tee seen
+PYTHONPATH=old venv/bin/python angle.py | tee seen
 diff seen - <<'END'
 turned by 0: sides 50 x 100, angle 90, longer side of boxPoints 0
 turned by 30: sides 100 x 50, angle 30, longer side of boxPoints 30
 turned by 60: sides 100 x 50, angle 60, longer side of boxPoints 60
 END
-new/bin/python angle.py | tee seen
+PYTHONPATH=new venv/bin/python angle.py | tee seen
 diff seen - <<'END'
 turned by 0: sides 50 x 100, angle -90, longer side of boxPoints 0
 turned by 30: sides 50 x 100, angle -60, longer side of boxPoints 30

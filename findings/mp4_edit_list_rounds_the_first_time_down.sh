@@ -1,9 +1,8 @@
 # av 18.1.0: an MP4's first frame time is cut to whole milliseconds, and all frames move with it
 #
 # Behaviour: 60 frames with exact times in a 1/90000 s time base are muxed into MP4. A first frame
-#   at 1.2345 s is read back at 1.2340 s, one at 33.9 ms at 33 ms; every later frame is early by the
-#   same amount, and at the edges the rounding spoils single times by a tick. A file that begins at
-#   0 is exact, so a test with times from 0 shows nothing.
+#   at 1.2345 s is read back at 1.2340 s, one at 33.9 ms at 33 ms, and every later frame is early by
+#   the same amount. A file that begins at 0 is exact, so a test with times from 0 shows nothing.
 # Guess: the file's time base (1/90000 s) is the resolution of all its times.
 # So: two cameras or a camera and a log, aligned by the times in MP4 files, are off by up to 1 ms
 #   each, which is 2 degrees of phase at 5 Hz. Keep the start time outside the file, or begin at 0.

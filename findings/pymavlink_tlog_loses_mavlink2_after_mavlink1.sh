@@ -1,9 +1,9 @@
 # pymavlink 2.4.50: a .tlog that begins in MAVLink 1 and goes on in MAVLink 2 is read without the version 2 messages, and MAVLINK20=0 repairs it
 #
 # Behaviour: 100 heartbeats in version 1, then 100 ODOMETRY (message 331) and LOCAL_POSITION_NED in
-#   version 2, as an autopilot sends when a ground station joins. mavlink_connection reads ODOMETRY
-#   as UNKNOWN_331 without fields; recv_match(type="ODOMETRY") gives none, and nothing is raised.
-#   With the variable MAVLINK20 in the environment all are read, even if its value is 0.
+#   version 2, as on a link that changes to version 2 after it began. mavlink_connection reads
+#   ODOMETRY as UNKNOWN_331; a filter for type ODOMETRY gives none, and nothing is raised. With the
+#   variable MAVLINK20 in the environment all are read, even if its value is 0.
 # Guess: the reader follows the protocol version of each packet; MAVLINK20=0 asks for version 1.
 # So: set MAVLINK20=1 before pymavlink is imported, and count UNKNOWN_ messages before a log is said
 #   to have no odometry.

@@ -2,9 +2,9 @@
 #
 # Behaviour: two recordings hold my_msgs/msg/Cmd with the same three float64 fields in another
 #   order, (vx, vy, wz) and (wz, vx, vy), say before and after a change of the message. Read alone
-#   each is right. Read together, the definition read last decodes both: the first recording's
-#   values arrive under other names, or the second one's if the paths are given in the other order.
-#   Nothing is raised, though each connection keeps its own definition and its own hash.
+#   each is right. Read together, the definition of the path given last decodes both, and the values
+#   of the other recording arrive under other names. Nothing is raised, though each connection keeps
+#   its own definition and its own hash.
 # Guess: a message is decoded by the definition stored beside it, and a clash of names is an error.
 # So: read recordings one by one, or build a type store for each connection from its own msgdef.
 # Source: types of all readers are merged into one type store in

@@ -1,9 +1,9 @@
 # av 18.1.0, numpy 2.4.6: x264, x265 and SVT-AV1 at everyday quality remove motion below a third of a pixel
 #
 # Behaviour: a soft disc swings sideways on a still, slightly noisy background. Of a swing of 0.3 px
-#   rms at 4 Hz x264 keeps 0.8 at CRF 18, half at CRF 23 and a sixth at CRF 28; x265 at CRF 28 keeps
-#   a twentieth, SVT-AV1 at CRF 35 next to nothing. Of 0.1 px a tenth is left at x264's own default,
-#   CRF 23. The same file keeps slow motion better than fast and large better than small.
+#   rms at 4 Hz x264 keeps three quarters at CRF 18, half at its default of CRF 23 and a tenth at
+#   CRF 28; x265 at CRF 28 and SVT-AV1 at CRF 35 keep next to nothing. Of 0.1 px next to nothing is
+#   left at CRF 23. The same file keeps slow motion better than fast and large better than small.
 # Guess: a compressed film is a noisier copy, and motion comes through at its true size.
 # So: amplitudes must not be compared across films, sizes or frequencies; "no motion seen" in a
 #   compressed film says nothing below some tenths of a pixel. Record at CRF 18 or better.
