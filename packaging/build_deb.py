@@ -21,7 +21,7 @@ DEPENDS = "python3 (>= 3.11), python3-numpy, python3-can, python3-serial, adduse
 LAUNCHER = """#!/usr/bin/python3
 import sys
 
-from mtm_onboard.cli import main
+from mtm_onboard.__main__ import main
 
 sys.exit(main())
 """

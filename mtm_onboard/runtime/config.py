@@ -1,13 +1,13 @@
 """The robot's configuration: one TOML file, explained field by field in docs/robot.example.toml."""
 
 import math
-import tomllib
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.input_file import BrokenTextError, parsed_toml, read_text
 from mtm_onboard.runtime.guard import Limits, Staleness
 
 Option = str | int | float | bool
@@ -115,13 +115,9 @@ class RobotConfig:
 def load_config(path: Path) -> RobotConfig:
     """Read a configuration; raises MtmError with one sentence that says what to change."""
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise MtmError(f"cannot read the configuration {path}: {error.strerror}; check the name") from error
-    except UnicodeDecodeError as error:
-        raise MtmError(f"{path} is not text; name a configuration such as docs/robot.example.toml") from error
-    except tomllib.TOMLDecodeError as error:
-        raise MtmError(f"{path} is not valid TOML ({error}); correct that line") from error
+        table = parsed_toml(read_text(path, "the configuration"))
+    except BrokenTextError as error:
+        raise MtmError(f"{path} is not valid TOML ({error}); correct that line, or name another file") from error
     try:
         return config_from_table(table)
     except MtmError as error:

@@ -1,4 +1,3 @@
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -9,6 +8,7 @@ from mtm_onboard.links.factory import make_transport
 from mtm_onboard.links.none import NullTransport
 from mtm_onboard.model.velocity import STOP
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.input_file import BrokenTextError
 from mtm_onboard.runtime.config import (
     ControlSettings,
     JournalSettings,
@@ -125,7 +125,7 @@ def test_files_that_hold_no_configuration_are_refused(tmp_path):
     path.write_text("speed = ")
     with pytest.raises(MtmError, match="correct that line") as caught:
         load_config(path)
-    assert isinstance(caught.value.__cause__, tomllib.TOMLDecodeError)
+    assert isinstance(caught.value.__cause__, BrokenTextError)
     path.write_text("[robot]\nname = 'r'\n")
     with pytest.raises(MtmError, match=r"robot.toml: the section \[transport\] is missing"):
         load_config(path)
