@@ -20,13 +20,14 @@ from mtm_onboard.model.clock import Clock, SystemClock
 from mtm_onboard.protocol import Key, MtmError, Scheme
 from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.runtime.config import RobotConfig, SourceSettings
+from mtm_onboard.runtime.datagram_source import UdpSource, UnixSource
 from mtm_onboard.runtime.guard import Guard
 from mtm_onboard.runtime.loop import LoopStats, run_loop
 from mtm_onboard.runtime.message import SILENCE, Content, message_of
 from mtm_onboard.runtime.modulator import Modulator
 from mtm_onboard.runtime.realtime import realtime
 from mtm_onboard.runtime.service import ServiceThread
-from mtm_onboard.runtime.source import Source, StdinSource, UdpSource
+from mtm_onboard.runtime.source import Source, StdinSource
 from mtm_onboard.runtime.tick import Runtime
 
 # Between opening the link and the message's first tick, so that the loop is running by then.
@@ -187,6 +188,8 @@ def _modulator(key: Key, channel_name: str, plan: Plan, first_slot: int) -> Modu
 
 
 def _source(settings: SourceSettings) -> Source:
+    if settings.socket is not None:
+        return UnixSource(Path(settings.socket))
     return StdinSource() if settings.port is None else UdpSource(settings.port)
 
 

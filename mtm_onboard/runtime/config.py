@@ -13,7 +13,7 @@ from mtm_onboard.runtime.guard import Limits, Staleness
 Option = str | int | float | bool
 _SECTIONS = ("robot", "transport", "link", "limits", "stale", "source", "journal", "control", "realtime")
 _OPTIONAL_SECTIONS = ("link", "stale", "journal", "control", "realtime")
-_SOURCE_KINDS = ("udp", "stdin")
+_SOURCE_KINDS = ("unix", "udp", "stdin")
 _T = TypeVar("_T")
 
 
@@ -27,18 +27,26 @@ class Robot:
 
 @dataclass(frozen=True)
 class SourceSettings:
-    """Where base commands come from: "udp" with a loopback `port`, or "stdin" without one."""
+    """Where base commands come from: "unix" with the path of a `socket`, "udp" with a loopback `port`, or "stdin"."""
 
-    kind: str
+    kind: str = "unix"
+    socket: str | None = None
     port: int | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in _SOURCE_KINDS:
             raise MtmError(f"kind is {self.kind!r}; choose one of: {', '.join(_SOURCE_KINDS)}")
+        if (self.kind == "unix") != bool(self.socket):
+            raise MtmError("a socket belongs to kind unix and to no other; add its path or remove it")
         if (self.kind == "udp") != (self.port is not None):
             raise MtmError("a port belongs to kind udp and to no other; add or remove it")
         if self.port is not None and not 1 <= self.port <= 65_535:
             raise MtmError(f"port is {self.port}; choose 1 to 65535")
+
+    def __str__(self) -> str:
+        return {
+            "unix": f"the socket {self.socket}", "udp": f"UDP port {self.port}", "stdin": "standard input",
+        }[self.kind]  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -80,6 +80,6 @@ def test_a_port_for_base_commands_is_free_or_a_failure():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         port = other.getsockname()[1]
-        assert check_source(SourceSettings("udp", port)).status == "fail"
-    assert check_source(SourceSettings("udp", port)).status == "pass"
+        assert check_source(SourceSettings("udp", port=port)).status == "fail"
+    assert check_source(SourceSettings("udp", port=port)).status == "pass"
     assert check_source(SourceSettings("stdin")).status == "pass"

@@ -34,6 +34,12 @@ def table(**sections):
     return {name: section for name, section in merged.items() if section is not None}
 
 
+def test_base_commands_come_over_a_unix_socket_unless_it_says_otherwise():
+    source = config_from_table(table(source={"socket": "r.base"})).source
+    assert source == SourceSettings("unix", "r.base")
+    assert str(source) == "the socket r.base"
+
+
 def test_the_documented_example_says_what_it_says():
     config = load_config(EXAMPLE)
     assert config.robot == Robot("robot0", "robot0")
@@ -41,7 +47,7 @@ def test_the_documented_example_says_what_it_says():
     assert config.transport_options == {"interface": "slcan", "channel": "/dev/ttyACM0", "bitrate": 1_000_000}
     assert config.limits == Limits(1.0, 2.0, noise_sigmas=4.0)
     assert config.staleness == Staleness(0.1, 0.25)
-    assert config.source == SourceSettings("udp", 5005)
+    assert config.source == SourceSettings("udp", port=5005)
     assert config.journal == JournalSettings("robot0.csv", max_mb=200)
     assert config.link == LinkSettings(reconnect=True, give_up_s=60)
 
@@ -70,9 +76,13 @@ def test_the_defaults_are_those_that_the_example_documents():
         ({"limits": {"speed_mps": -1.0, "turn_rate_radps": 1.0}}, "above zero"),
         ({"limits": {"speed_mps": float("nan"), "turn_rate_radps": 1.0}}, "above zero"),
         ({"stale": {"noise_off_s": 0.3}}, "noise off before the stop"),
-        ({"source": {"kind": "radio"}}, "choose one of: udp, stdin"),
+        ({"source": {"kind": "radio"}}, "choose one of: unix, udp, stdin"),
         ({"source": {"kind": "udp"}}, "port belongs to kind udp"),
         ({"source": {"kind": "stdin", "port": 5005}}, "port belongs to kind udp"),
+        ({"source": {"port": 5005}}, "socket belongs to kind unix"),
+        ({"source": {}}, "socket belongs to kind unix"),
+        ({"source": {"socket": ""}}, "socket belongs to kind unix"),
+        ({"source": {"kind": "udp", "port": 5005, "socket": "r.base"}}, "socket belongs to kind unix"),
         ({"source": {"kind": "udp", "port": 70_000}}, "choose 1 to 65535"),
         ({"source": {"kind": "udp", "port": 5005.0}}, "give a whole number"),
         ({"journal": {}}, "lacks path"),
