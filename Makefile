@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test lint bench mutants firmware deb deb-test clean
+.PHONY: setup demo test lint peers bench mutants firmware deb deb-test clean
 
 setup: $(STAMP)
 
@@ -29,6 +29,11 @@ lint: setup
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy --no-error-summary
 
+# Programs of others that ours meet, each at the version that tests/peers/requirements names.
+peers: setup
+	$(BIN)/python tests/peers/install.py
+	$(BIN)/pytest tests/peers -m peer -rs
+
 firmware: setup
 	$(MAKE) -C firmware_shim
 
@@ -46,4 +51,4 @@ bench: setup
 	$(BIN)/pytest tests/benchmarks --benchmark-enable -s
 
 clean:
-	rm -rf $(VENV) out build dist firmware_shim/build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .peers out build dist firmware_shim/build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

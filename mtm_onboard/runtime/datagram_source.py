@@ -118,6 +118,10 @@ class UdpSource(_DatagramSource):
         lost = self._dropped()
         if lost != self.lost:
             self.lost = lost
+            if not self._newest.stop:
+                self.stop_reason = (
+                    f"{lost} datagrams came faster than they are read, and a stop may have been among them"
+                )
             self._newest = self._newest._replace(stop=True)
         return self._newest
 

@@ -32,7 +32,7 @@ class Source(ABC):
 
     `refused` counts input that was malformed, oversized or non-finite. Where several may send, `sender` is who drives
     the robot, `intrusions` counts the commands of others, the latest of them being `intruder`, and `lost` what the
-    system dropped; else they stay as they are here.
+    system dropped; else they stay as they are here. `stop_reason` says why a command has a stop.
     """
 
     refused = 0
@@ -40,6 +40,7 @@ class Source(ABC):
     intruder = ""
     intrusions = 0
     lost = 0
+    stop_reason = "the operator said stop"
 
     @abstractmethod
     def poll(self, now_s: float) -> Command:

@@ -65,7 +65,7 @@ class Runtime:
         if stop and not self._stop_noted:
             self._stop_noted = True
             guard.stop()
-            self._note(tick, "the operator said stop")
+            self._note(tick, self._source.stop_reason)
         if transport.up_since_s != self._up_since_s:
             self._follow_link(tick, now_s)
         base = guard.admit(velocity, arrived_s, now_s, after_s=self._after_s)
