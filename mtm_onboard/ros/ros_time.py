@@ -10,7 +10,7 @@ _POLL_S = 0.001
 _TELLING_STEPS = 3
 # Steps of one tick, give or take a float's last digits, are not long.
 _LONG = 1.001
-# Seconds since 1970 as floats stand a hair before a deadline that they have reached; in ticks, less than the loop's own.
+# Seconds since 1970 as floats stand a hair before a deadline they have reached; in ticks, less than the loop's own.
 _HAIR = 5e-5
 
 

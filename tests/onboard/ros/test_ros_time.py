@@ -35,7 +35,7 @@ class Published:
 
 
 def test_ticks_come_from_the_time_and_not_from_the_messages(monkeypatch):
-    published = Published([0.005] * 400, monkeypatch)
+    published = Published([0.005] * 398, monkeypatch)
     assert published.ticks() == list(range(100))
     assert published.warnings == []
 
