@@ -111,9 +111,10 @@ def _ends(node: Any, clock: Clock, *, simulated: bool) -> Ends:
 
     # Hears reliable publishers and those of sensor data alike; a reliable one would hear nothing of the latter.
     heard = QoSProfile(depth=_DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
-    commands = node.create_subscription(Twist, "cmd_vel", take, heard)
-    service = node.create_service(Trigger, "~/stop", stop)
+    node.create_subscription(Twist, "cmd_vel", take, heard)
+    node.create_service(Trigger, "~/stop", stop)
+    heard_name, sent_name = map(node.resolve_topic_name, ("cmd_vel", "cmd_vel_out"))
     return Ends(
-        source, TwistLink(Twist, publisher.publish), clock, simulated, f"the topic {commands.topic_name}",
-        f"the topic {publisher.topic_name}", f"call the service {service.srv_name}",
+        source, TwistLink(Twist, publisher.publish), clock, simulated, f"the topic {heard_name}",
+        f"the topic {sent_name}", f"call the service {node.resolve_service_name('~/stop')}",
     )  # fmt: skip

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from mtm_onboard.protocol.errors import MtmError
 
 _POLL_S = 0.001
-# Several steps in a row: one may be long because this host was busy.
-_TELLING_STEPS = 3
+# So many long steps in a row; a few may be long because this host was busy.
+_TELLING_STEPS = 10
 # Steps of one tick, give or take a float's last digits, are not long.
 _LONG = 1.001
 # Seconds since 1970 as floats stand a hair before a deadline they have reached; in ticks, less than the loop's own.
