@@ -24,6 +24,10 @@ SYMBOLS = (1, 3, 0, 2)
 ALONE = {
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": str(1 + os.getpid() % 100),
     "RCUTILS_LOGGING_USE_STDOUT": "1",
+    # Cyclone DDS would take the network's interface and find its peers by multicast.
+    "CYCLONEDDS_URI": '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="false"/>'
+    "</Interfaces></General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>40"
+    '</MaxAutoParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>',
 }  # fmt: skip
 
 
