@@ -61,7 +61,7 @@ def lay_out(tree: Path) -> None:
     place(documents / "copyright", COPYRIGHT + indented)
     for page in ("README.md", "docs/doctor.md"):
         place(documents / page, (ROOT / page).read_text(encoding="utf-8"))
-    for example in (ROOT / "docs/robot.example.toml", HERE / "cloud-init/user-data.yaml"):
+    for example in (*sorted((ROOT / "examples/robots").iterdir()), HERE / "cloud-init/user-data.yaml"):
         place(documents / "examples" / example.name, example.read_text(encoding="utf-8"))
     (tree / "etc/mtm").mkdir(parents=True)
 

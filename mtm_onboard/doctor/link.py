@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from mtm_onboard.doctor.can_interface import check_interface
 from mtm_onboard.doctor.finding import Finding
 from mtm_onboard.links.factory import make_transport
+from mtm_onboard.links.mavlink_codec import HOW_TO_INSTALL
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.runtime.config import Option
 
@@ -133,7 +134,7 @@ def _check_robomaster_tcp(options: Options) -> Finding:
 
 def _check_mavlink(options: Options) -> Finding:
     if find_spec("pymavlink") is None:
-        return Finding("link", "fail", "pymavlink is not installed; install mtm[mavlink]")
+        return Finding("link", "fail", HOW_TO_INSTALL)
     endpoint = str(options["endpoint"])
     kind, colon, rest = endpoint.partition(":")
     if not colon:

@@ -6,13 +6,19 @@ from typing import Any
 from mtm_onboard.links.mavlink_signing import signing_timestamp
 from mtm_onboard.protocol.errors import MtmError
 
+# Debian has no package of it, and its Python lets pip install beside its packages only when told so.
+HOW_TO_INSTALL = (
+    "pymavlink is not installed; run pip install pymavlink, or with the Debian package "
+    "sudo pip install --break-system-packages pymavlink"
+)
+
 
 def dialect() -> Any:
     """The module of MAVLink's common messages; raises MtmError when pymavlink is missing."""
     try:
         from pymavlink.dialects.v20 import common
     except ImportError:
-        raise MtmError("pymavlink is not installed; install mtm[mavlink] to reach a vehicle over MAVLink.") from None
+        raise MtmError(HOW_TO_INSTALL) from None
     return common
 
 

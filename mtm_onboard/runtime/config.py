@@ -1,4 +1,4 @@
-"""The robot's configuration: one TOML file, explained field by field in docs/robot.example.toml."""
+"""The robot's configuration: one TOML file, explained field by field in examples/robots/none.toml."""
 
 import math
 from dataclasses import MISSING, dataclass, fields

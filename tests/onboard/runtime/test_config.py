@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,8 @@ from mtm_onboard.runtime.config import (
 )
 from mtm_onboard.runtime.guard import Limits, Staleness
 
-EXAMPLE = Path(__file__).parents[3] / "docs" / "robot.example.toml"
+EXAMPLES = Path(__file__).parents[3] / "examples/robots"
+EXAMPLE = EXAMPLES / "none.toml"
 
 
 def table(**sections):
@@ -43,13 +45,30 @@ def test_base_commands_come_over_a_unix_socket_unless_it_says_otherwise():
 def test_the_documented_example_says_what_it_says():
     config = load_config(EXAMPLE)
     assert config.robot == Robot("robot0", "robot0")
-    assert config.transport_kind == "robomaster-can"
-    assert config.transport_options == {"interface": "slcan", "channel": "/dev/ttyACM0", "bitrate": 1_000_000}
+    assert (config.transport_kind, config.transport_options) == ("none", {})
     assert config.limits == Limits(1.0, 2.0, noise_sigmas=4.0)
     assert config.staleness == Staleness(0.1, 0.25)
-    assert config.source == SourceSettings("udp", port=5005)
+    assert config.source == SourceSettings("unix", "robot0.base")
     assert config.journal == JournalSettings("robot0.csv", max_mb=200)
     assert config.link == LinkSettings(reconnect=True, give_up_s=60)
+    assert config.control == ControlSettings("robot0.sock")
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.iterdir()), ids=lambda path: path.stem)
+def test_there_is_an_example_of_each_link_which_makes_that_link(path):
+    config = load_config(path)
+    assert config.transport_kind == path.stem
+    assert make_transport(config.transport_kind, config.transport_options).health is not None
+    # Else they are as the one that explains them.
+    assert replace(config, transport_kind="none", transport_options={}) == load_config(EXAMPLE)
+
+
+def test_every_kind_of_link_has_an_example():
+    with pytest.raises(MtmError) as refused:
+        make_transport("no such kind", {})
+    kinds = str(refused.value).partition("choose one of: ")[2].split(", ")
+    assert kinds
+    assert {path.stem for path in EXAMPLES.iterdir()} == set(kinds)
 
 
 def test_the_defaults_are_those_that_the_example_documents():
@@ -58,6 +77,7 @@ def test_the_defaults_are_those_that_the_example_documents():
     assert config.limits.noise_sigmas == load_config(EXAMPLE).limits.noise_sigmas
     assert config.link == load_config(EXAMPLE).link
     assert config.journal is None
+    assert config.control is None
 
 
 @pytest.mark.parametrize(
