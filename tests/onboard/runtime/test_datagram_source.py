@@ -138,6 +138,26 @@ def test_a_stop_behind_hundreds_of_datagrams_comes_in_the_same_tick():
     source.close()
 
 
+def test_of_a_flood_of_others_the_driver_s_own_command_and_each_stop_count():
+    source = UdpSource(0)
+    driver, other = BaseCommandClient(source.port), BaseCommandClient(source.port)
+    driver.send(FIRST)
+    source.poll(0.02)
+    driver.send(SECOND)
+    for _ in range(200):
+        other.send(FIRST)
+    assert source.poll(0.04) == Command(SECOND, 0.04, False)
+    assert source.intrusions == 200
+    other.stop()
+    for _ in range(200):
+        other.send(FIRST)
+    assert source.poll(0.06) == Command(SECOND, 0.04, True)
+    assert source.intrusions == 400
+    driver.close()
+    other.close()
+    source.close()
+
+
 def test_what_the_system_drops_counts_as_a_stop_and_is_told():
     source = UdpSource(0)
     client = BaseCommandClient(source.port)
