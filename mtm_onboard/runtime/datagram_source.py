@@ -8,7 +8,6 @@ velocities.
 import socket
 import struct
 from abc import abstractmethod
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -66,10 +65,12 @@ class _DatagramSource(TextSource):
 
     def _drained(self) -> list[Datagram]:
         datagrams: list[Datagram] = []
-        with suppress(OSError):
-            # Until nothing is left, or the socket fails: either way no command came, and the last one goes on ageing.
+        try:
             for _ in range(self._most_reads):
                 datagrams.append(self._received())
+        except OSError:
+            # Nothing left, or a socket that fails: either way no command came, and the last one goes on ageing.
+            pass
         return datagrams
 
     @abstractmethod
