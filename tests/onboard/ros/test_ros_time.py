@@ -29,7 +29,7 @@ class Published:
         """Those that a loop at 50 Hz has until the clock stands still."""
         ticks: list[int] = []
         run_loop(
-            self.clock, 1.0 / PERIOD_S, lambda tick, now_s: ticks.append(tick), start_s=100.0, stop=lambda: self.ended
+            self.clock, 1.0 / PERIOD_S, lambda tick, *_: ticks.append(tick), start_s=100.0, stop=lambda: self.ended
         )
         return ticks
 
