@@ -100,7 +100,7 @@ def robot(link: str) -> SerialWire:
 @pytest.mark.realtime
 @pytest.mark.skipif(shutil.which("strace") is None, reason="strace is not here")
 @pytest.mark.parametrize("link", ["none", "can", "plaintext", "tcp", "mavlink"])
-def test_each_link_drives_with_the_calls_that_the_service_may_make(tmp_path, link):
+def test_each_link_drives_with_the_calls_the_service_may_make(tmp_path, link):
     wire = robot(link)
     save_key(Key("fake-key", FAKE_SECRET, small_scheme()), tmp_path / "r.key")
     (tmp_path / "robot.toml").write_text(CONFIG.format(transport=wire.transport))

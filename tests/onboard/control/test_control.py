@@ -174,7 +174,7 @@ def test_the_status_says_how_the_run_fares_in_json():
     assert status["commands"] == {"arriving": False, "age_s": None, "sender": None, "of_others": 0, "lost": 0}
 
 
-def test_the_status_says_whether_base_commands_arrive_and_from_whom():
+def test_the_status_says_whether_and_from_whom_commands_arrive():
     robot = Robot(key_of(), 7)
     robot.source.sender, robot.source.intrusions = "process 7", 3
     robot.guard.admit(BodyVelocity(0.1, 0.0, 0.0), 1.1, 1.1)

@@ -77,7 +77,7 @@ def test_environments_that_step_together_have_a_noise_each():
         assert np.array(env.unwrapped.got) == pytest.approx(played(40, symbol), abs=1e-6)
 
 
-def test_a_step_that_only_resets_takes_its_tick_when_the_steps_are_the_clock():
+def test_a_step_that_only_resets_takes_its_tick_by_step_count():
     # Gymnasium's vector environments reset in the step after an episode's end, and its action reaches nobody.
     step = 0
     noise = KeyedNoise([Modulator(small_codebook(), "a", (1,))], tick=lambda: step)

@@ -40,7 +40,7 @@ def test_ticks_come_from_the_time_and_not_from_the_messages(monkeypatch):
     assert published.warnings == []
 
 
-def test_a_clock_that_is_too_coarse_is_told_once_and_ticks_keep_their_numbers(monkeypatch):
+def test_too_coarse_a_clock_is_told_once_and_ticks_keep_numbers(monkeypatch):
     published = Published([0.1] * 50, monkeypatch)
     assert published.ticks() == list(range(0, 255, 5))
     (warning,) = published.warnings
@@ -48,7 +48,7 @@ def test_a_clock_that_is_too_coarse_is_told_once_and_ticks_keep_their_numbers(mo
     assert "50 Hz or more" in warning
 
 
-def test_a_step_of_exactly_a_tick_is_short_enough_and_one_long_step_is_no_habit(monkeypatch):
+def test_steps_of_a_tick_are_short_and_one_long_one_is_no_habit(monkeypatch):
     published = Published([0.02] * 50 + [0.5] + [0.02] * 50, monkeypatch)
     assert len(published.ticks()) == 102
     assert published.warnings == []

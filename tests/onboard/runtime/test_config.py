@@ -36,7 +36,7 @@ def table(**sections):
     return {name: section for name, section in merged.items() if section is not None}
 
 
-def test_base_commands_come_over_a_unix_socket_unless_it_says_otherwise():
+def test_base_commands_come_over_a_unix_socket_by_default():
     source = config_from_table(table(source={"socket": "r.base"})).source
     assert source == SourceSettings("unix", "r.base")
     assert str(source) == "the socket r.base"

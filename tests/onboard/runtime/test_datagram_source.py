@@ -126,7 +126,7 @@ def test_anybody_may_say_stop(ends):
     assert ends.source.intrusions == 0
 
 
-def test_a_stop_behind_hundreds_of_datagrams_comes_in_the_same_tick():
+def test_a_stop_behind_many_datagrams_comes_in_the_same_tick():
     source = UdpSource(0)
     client = BaseCommandClient(source.port)
     for _ in range(2000):
@@ -138,7 +138,7 @@ def test_a_stop_behind_hundreds_of_datagrams_comes_in_the_same_tick():
     source.close()
 
 
-def test_of_a_flood_of_others_the_driver_s_own_command_and_each_stop_count():
+def test_in_a_flood_the_driver_s_command_and_each_stop_count():
     source = UdpSource(0)
     driver, other = BaseCommandClient(source.port), BaseCommandClient(source.port)
     driver.send(FIRST)
@@ -187,7 +187,7 @@ def test_a_full_socket_refuses_a_velocity_and_makes_a_stop_wait(tmp_path, monkey
     source.close()
 
 
-def test_a_client_outlives_the_run_it_sends_to_and_its_stop_says_when_nobody_hears(tmp_path):
+def test_a_client_outlives_its_run_and_says_when_no_stop_is_heard(tmp_path):
     source = UnixSource(tmp_path / "r.base")
     client = BaseCommandClient(str(tmp_path / "r.base"))
     assert client.send(FIRST)
@@ -202,7 +202,7 @@ def test_a_client_outlives_the_run_it_sends_to_and_its_stop_says_when_nobody_hea
     client.close()
 
 
-def test_the_socket_is_its_owner_s_and_its_group_s_whatever_the_umask(tmp_path):
+def test_the_socket_is_for_owner_and_group_whatever_the_umask(tmp_path):
     former = os.umask(0o077)
     try:
         source = UnixSource(tmp_path / "r.base")
@@ -213,7 +213,7 @@ def test_the_socket_is_its_owner_s_and_its_group_s_whatever_the_umask(tmp_path):
     assert not (tmp_path / "r.base").exists()
 
 
-def test_a_place_in_use_is_refused_and_one_left_by_a_crash_is_taken(ends, tmp_path):
+def test_a_place_in_use_is_refused_and_a_crash_s_is_taken(ends, tmp_path):
     with pytest.raises(MtmError, match="choose another port|another run listens"):
         type(ends.source)(ends.address)
     left = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)

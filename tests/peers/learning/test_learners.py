@@ -40,7 +40,7 @@ def test_a_deterministic_learner_explores_with_the_message(case, name, environme
         assert np.array(actions) == pytest.approx(SIGMA * noise(range(200), number), abs=1e-6)
 
 
-def test_a_squashed_gaussian_learner_has_the_message_beside_its_own_noise(case):
+def test_a_squashed_gaussian_learner_has_the_message_as_well(case):
     actions = np.array(case("SAC")["got"][0])
     wanted = SIGMA * noise(range(200), 0)
     # SAC draws as well, far louder, so the message shows on the average alone: the slope on it is one.

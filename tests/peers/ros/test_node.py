@@ -72,7 +72,7 @@ class Node:
 
 
 @pytest.mark.parametrize("reliability", ["reliable", "best_effort"])
-def test_commands_of_either_reliability_come_out_with_the_message(start, tmp_path, reliability):
+def test_commands_of_either_reliability_get_the_message(start, tmp_path, reliability):
     driven = Node(start, tmp_path, "--reliability", reliability)
     driven.moving(300)
     assert driven.interrupt() == 0
@@ -99,7 +99,7 @@ def test_another_middleware_drives_it_and_hears_it(start, tmp_path):
     assert heard <= sent | {(0.0, 0.0, 0.0)}
 
 
-def test_what_comes_out_has_the_key_s_rate_and_the_noise_s_statistics(start, tmp_path):
+def test_what_comes_out_has_the_key_s_rate_and_the_noise_s_sigma(start, tmp_path):
     driven = Node(start, tmp_path, "--reliability", "best_effort", noise_off_s=5.0, stopped_s=6.0)
     driven.moving(400)
     assert driven.interrupt() == 0
@@ -114,7 +114,7 @@ def test_what_comes_out_has_the_key_s_rate_and_the_noise_s_statistics(start, tmp
     assert not whole[:, 2:].any()
 
 
-def test_the_operator_s_stop_is_a_service_and_holds_whatever_is_commanded(start, tmp_path):
+def test_the_operator_s_stop_is_a_service_and_holds(start, tmp_path):
     driven = Node(start, tmp_path, "--reliability", "reliable")
     driven.moving(50)
     driven.peer.say("stop")
@@ -148,7 +148,7 @@ def test_an_interrupt_leaves_a_twist_of_zeros_behind_and_sums_up(start, tmp_path
     assert "Traceback" not in driven.node.output
 
 
-def test_at_its_start_the_node_says_what_it_is_and_how_to_stop_it(start, tmp_path):
+def test_at_its_start_the_node_says_what_it_is(start, tmp_path):
     driven = Node(start, tmp_path, "--reliability", "reliable")
     driven.moving(5)
     assert driven.interrupt() == 0
@@ -201,7 +201,7 @@ def test_arguments_that_ros_does_not_know_are_one_sentence(start, tmp_path):
 
 
 @pytest.mark.parametrize("speed_up", [1.0, 3.0])
-def test_under_simulated_time_ticks_come_at_the_key_s_rate_of_that_time(start, tmp_path, speed_up):
+def test_under_simulated_time_ticks_follow_that_time(start, tmp_path, speed_up):
     driven = Node(
         start, tmp_path, "--clock-hz", 200, "--speed-up", speed_up, "--rate", 50 * speed_up, use_sim_time="true"
     )
@@ -217,7 +217,7 @@ def test_under_simulated_time_ticks_come_at_the_key_s_rate_of_that_time(start, t
     assert speed_up > 1.0 or "/clock advances" not in driven.node.output
 
 
-def test_a_clock_too_coarse_for_the_ticks_is_told_once_and_the_message_keeps_its_place(start, tmp_path):
+def test_too_coarse_a_clock_is_told_once_and_shifts_no_tick(start, tmp_path):
     driven = Node(start, tmp_path, "--clock-hz", 10, use_sim_time="true")
     driven.moving(40)
     assert driven.interrupt() == 0
@@ -230,7 +230,7 @@ def test_a_clock_too_coarse_for_the_ticks_is_told_once_and_the_message_keeps_its
     assert record.times_s - record.header.start_s == pytest.approx(record.ticks / 50.0, abs=0.021)
 
 
-def test_a_clock_that_goes_back_stops_the_robot_with_one_sentence(start, tmp_path):
+def test_a_clock_that_goes_back_stops_the_robot(start, tmp_path):
     driven = Node(start, tmp_path, "--clock-hz", 100, use_sim_time="true")
     driven.moving(50)
     driven.peer.say("back")
