@@ -187,7 +187,7 @@ def test_a_full_socket_refuses_a_velocity_and_makes_a_stop_wait(tmp_path, monkey
     source.close()
 
 
-def test_a_client_outlives_its_run_and_says_when_no_stop_is_heard(tmp_path):
+def test_a_client_outlives_its_run_and_says_when_none_hears(tmp_path):
     source = UnixSource(tmp_path / "r.base")
     client = BaseCommandClient(str(tmp_path / "r.base"))
     assert client.send(FIRST)
