@@ -11,9 +11,7 @@ PYTEST :=
 # The build without CUDA where the index offers it under this number.
 TORCH := torch==2.13.0
 
-TARGETS := $(shell sed -n 's/^\([a-z-]*\):.*/\1/p' Makefile)
-
-.PHONY: setup demo site test test-all test-long test-oldest lint bench mutants firmware firmware-mutants deb deb-test dist constraints \
+.PHONY: setup demo site test test-all test-long test-oldest lint peers bench mutants firmware firmware-mutants deb deb-test dist constraints \
   clean
 
 # $(call install,folder,file): the packages that a file of constraints/ names, by hash, and the project itself.
@@ -37,10 +35,10 @@ demo: $(VENV)/.hil
 	$(BIN)/mtm-hil demo --out out/demo
 
 test: setup lint
-	$(BIN)/pytest -m "not long" $(PYTEST)
+	$(BIN)/pytest -m "not long and not peer" $(PYTEST)
 
 # Everything: what `make test` runs, and then the rest.
-test-all: test test-long test-oldest mutants firmware firmware-mutants $(filter peers site,$(TARGETS))
+test-all: test test-long test-oldest mutants firmware firmware-mutants peers site
 
 # VMAS's worlds, the C compilers and the emulator, and the wheel in clean environments.
 test-long: $(VENV)/.worlds
@@ -48,7 +46,7 @@ test-long: $(VENV)/.worlds
 
 # The lower end of each range of versions, whose warnings are not ours to mend; `make test` and `make test-long` have the upper one.
 test-oldest: $(OLDEST)/.oldest
-	$(OLDEST)/bin/python -m pytest -o filterwarnings= -m "not long" $(PYTEST) tests/audit tests/onboard
+	$(OLDEST)/bin/python -m pytest -o filterwarnings= -m "not long and not peer" $(PYTEST) tests/audit tests/onboard
 
 $(OLDEST)/.oldest: pyproject.toml constraints/oldest.txt
 	@$(call install,$(OLDEST),oldest)
@@ -67,6 +65,12 @@ $(SITE_VENV)/.installed: docs/requirements.txt
 	$(PYTHON) -m venv $(SITE_VENV)
 	$(SITE_VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r docs/requirements.txt
 	@touch $@
+
+# Programs of others that ours meet, each at the version that tests/peers/requirements names. One that cannot be installed
+# here is skipped with the reason, so this takes no $(PYTEST).
+peers: setup
+	$(BIN)/python tests/peers/install.py
+	$(BIN)/pytest tests/peers -m peer -rs
 
 firmware: setup
 	$(MAKE) -C firmware_shim
@@ -106,4 +110,4 @@ $(UV):
 	build/uv/bin/pip install --quiet --disable-pip-version-check uv
 
 clean:
-	rm -rf $(VENV) $(SITE_VENV) out build dist firmware_shim/build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(SITE_VENV) .peers out build dist firmware_shim/build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

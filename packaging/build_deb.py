@@ -23,7 +23,7 @@ DEPENDS = "python3 (>= 3.11), python3-numpy, python3-can, python3-serial, adduse
 LAUNCHER = """#!/usr/bin/python3
 import sys
 
-from mtm_onboard.cli import main
+from mtm_onboard.__main__ import main
 
 sys.exit(main())
 """
@@ -68,7 +68,7 @@ def lay_out(tree: Path) -> None:
     place(documents / "copyright", COPYRIGHT + indented)
     for page in ("README.md", *(f"docs/{name}.md" for name in ("onboard", "doctor", "failsafes", "journal"))):
         place(documents / page, (ROOT / page).read_text(encoding="utf-8"))
-    for example in (ROOT / "docs/robot.example.toml", HERE / "cloud-init/user-data.yaml"):
+    for example in (*sorted((ROOT / "examples/robots").iterdir()), HERE / "cloud-init/user-data.yaml"):
         place(documents / "examples" / example.name, example.read_text(encoding="utf-8"))
     (tree / "etc/mtm").mkdir(parents=True)
 

@@ -85,6 +85,14 @@ class Guard:
         """Latch the operator's stop."""
         self._stopped = True
 
+    def age_s(self, now_s: float) -> float:
+        """Age of the newest good base command, infinite before any."""
+        return now_s - self._arrived_s
+
+    def is_stale(self, now_s: float) -> bool:
+        """Whether that is so old that the noise is off."""
+        return self.age_s(now_s) + _HAIR_S >= self._noise_off_s
+
     @property
     def noise_allowed(self) -> bool:
         """False in a tick whose base command is stale, refused, held or overruled by a stop."""

@@ -70,7 +70,7 @@ class Runtime:
         if stop and not self._stop_noted:
             self._stop_noted = True
             guard.stop()
-            self._note(tick, "the operator said stop")
+            self._note(tick, self._source.stop_reason)
         outages = self._outages
         if outages is not None and outages.up_since_s != self._up_since_s:
             self._follow_link(outages, tick, now_s)

@@ -196,7 +196,7 @@ def test_an_explanation_stops_where_an_error_stopped_it(audit, folder):
     assert "tracks     robot0: seen in 1001 of 1001 samples" in err
     assert "timing     FAILED: the recording of 'robot0' holds no whole window of 8 s" in err
     code, out, err = audit(folder / "sent/robot0.tum", folder / "nothing.tum", "--explain")
-    assert "recording  FAILED: there is no file" in err
+    assert "recording  FAILED: cannot read the recording" in err
     code, out, err = audit(folder / "sent", "--assign", "robot0=red", "--explain")
     assert "tracks     FAILED: the recording has no track 'red'" in err
 
@@ -271,7 +271,7 @@ def test_control_c_during_the_work_leaves_nothing_half_done(folder, tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("missing.tum", None, "there is no file"),
+        ("missing.tum", None, "No such file"),
         ("empty.tum", b"", "is empty"),
         ("empty.mp4", b"", "is empty"),
         ("text.mp4", b"this is no video", "is not a video that can be read"),

@@ -36,8 +36,7 @@ kind = "none"
 speed_mps = 1.0
 turn_rate_radps = 2.0
 [source]
-kind = "udp"
-port = 5005
+socket = "/var/lib/mtm/robot0.base"
 [control]
 socket = "/var/lib/mtm/robot0.sock"
 [journal]
@@ -132,7 +131,7 @@ def test_a_simulated_robot_takes_base_commands_says_two_messages_and_keeps_a_jou
             run.kill()
     assert run.returncode == 0
     assert "ticks sent" in said
-    assert answer.startswith("message 1 begins at")
+    assert answer.startswith(f"message 1, number {SECOND}, begins at")
     check_journal(robot)
     assert not (robot / HOME / "robot0.sock").exists()
 

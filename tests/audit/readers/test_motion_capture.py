@@ -61,7 +61,7 @@ def test_a_bad_file_is_refused_with_one_sentence(write, text, says):
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
-    with pytest.raises(MtmError, match="no file"):
+    with pytest.raises(MtmError, match="check the name"):
         read_motion_capture(tmp_path / "robot0.tum")
     with pytest.raises(MtmError, match="folder"):
         read_motion_capture(tmp_path)

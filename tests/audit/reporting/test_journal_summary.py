@@ -111,7 +111,7 @@ def test_in_simulated_time_the_noise_counts_from_the_message_s_start(tmp_path):
 def test_what_is_no_run_is_refused(tmp_path, ticks, sentence):
     with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
         for tick in ticks:
-            journal.append(tick, 0.0, BASE, BASE, 0, 0.0)
+            journal.append(tick, HEADER.start_s + tick / HEADER.rate_hz, BASE, BASE, 0, 0.0)
     record = read_journal(journal.path)
     for ask in (summary_of, injected_noise):
         with pytest.raises(MtmError, match=sentence):

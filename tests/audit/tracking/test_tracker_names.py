@@ -123,7 +123,7 @@ def test_a_bad_name_is_refused_before_the_video_is_read(audit, tmp_path, name):
     code, out, err = audit(tmp_path / "missing.mp4", "--tracker", name)
     assert (code, out) == (1, "")
     assert err.count("\n") == 1
-    assert "there is no file" not in err
+    assert "No such file" not in err
 
 
 def test_an_unknown_tracker_is_told_all_there_are(audit, gray_room):

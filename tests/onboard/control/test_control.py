@@ -39,17 +39,18 @@ class Robot:
         codebook = key.codebook(FIRST_SLOT)
         self.modulator = Ticking(codebook, "a", SILENCE if content is None else message_of(content, key))
         self.guard = Guard(Limits(1.0, 2.0), Staleness(), noise_sigma=0.1, period_s=0.02)
-        self.stats = LoopStats()
+        self.stats, self.source = LoopStats(), HeldSource()
         session = Session(
             robot="robot0",
             key=key,
             modulator=self.modulator,
             guard=self.guard,
-            source=HeldSource(),
+            source=self.source,
             transport=NullLink(),
             stats=self.stats,
             journal=journal,
-            tick=lambda: self.tick,
+            now_s=lambda: (self.tick + 0.5) / 50.0,
+            start_s=0.0,
             start_unix_s=START_UNIX_S,
             first_slot=FIRST_SLOT,
         )
@@ -68,7 +69,8 @@ def test_a_new_message_is_answered_with_the_boundary_it_begins_at():
     robot.modulator.now = 130
     answer = robot.send(number=9)
     assert answer == {
-        "tick": 240, "unix_s": START_UNIX_S + 4.8, "slot": FIRST_SLOT + 2, "number": 1, "replaces": None,
+        "tick": 240, "unix_s": START_UNIX_S + 4.8, "slot": FIRST_SLOT + 2, "number": 1, "content": "number 9",
+        "replaces": None,
     }  # fmt: skip
     assert robot.modulator.waiting == message_of(9, key_of(), 1)
 
@@ -195,7 +197,31 @@ def test_the_status_says_how_the_run_fares_in_json():
         "robot": "robot0", "key": "fake-key", "tick": 55, "sent": 50, "missed": 2, "refused": 1, "message": 0,
         "waiting": 1,
     }  # fmt: skip
-    assert (status["stopped"], status["journal_lost"], status["link"]) == (False, None, {})
+    assert (status["stopped"], status["journal_lost"]) == (False, None)
+    assert status["link"] == {"up": True, "fault": None}
+    assert (status["content"], status["waiting_content"]) == ("number 7", "number 1")
+    assert status["state"] == "standing still without base commands"
+    assert status["commands"] == {"arriving": False, "age_s": None, "sender": None, "of_others": 0, "lost": 0}
+
+
+def test_the_status_says_whether_and_from_whom_commands_arrive():
+    robot = Robot(key_of(), 7)
+    robot.source.sender, robot.source.intrusions = "process 7", 3
+    robot.guard.admit(BodyVelocity(0.1, 0.0, 0.0), 1.1, 1.1)
+    status = robot.control.answer({"command": "status"})
+    assert status["commands"] == {
+        "arriving": True, "age_s": pytest.approx(0.01), "sender": "process 7", "of_others": 3, "lost": 0,
+    }  # fmt: skip
+    assert status["state"] == "driving with the message"
+
+
+def test_a_stopped_robot_takes_no_message_and_says_so():
+    robot = Robot(key_of(), 7)
+    robot.control.answer({"command": "stop"})
+    with pytest.raises(MtmError, match="stopped for good"):
+        robot.send(number=1)
+    assert robot.modulator.waiting is None
+    assert robot.control.answer({"command": "status"})["state"] == "stopped for good"
 
 
 @pytest.mark.parametrize(

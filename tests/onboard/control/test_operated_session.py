@@ -23,7 +23,7 @@ from mtm_onboard.runtime.config import config_from_table
 from mtm_onboard.runtime.guard import NOISE, STOPPED
 from mtm_onboard.runtime.message import message_of
 from mtm_onboard.runtime.modulator import Modulator
-from mtm_onboard.runtime.source import Command
+from mtm_onboard.runtime.source import Command, Source
 from tests.onboard.schemes import FAKE_SECRET, small_scheme
 
 BASE = BodyVelocity(0.3, -0.1, 0.5)
@@ -34,16 +34,11 @@ ROLLING, FIXED = small_scheme(schedule="rolling"), small_scheme()
 times_s = st.floats(1.8e9, 1.9e9)
 
 
-class Steady:
+class Steady(Source):
     """A source with a fresh command at every poll."""
-
-    refused = 0
 
     def poll(self, now_s: float) -> Command:
         return Command(BASE, now_s, False)
-
-    def close(self) -> None:
-        pass
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Channel, Key, MtmError
 from mtm_onboard.runtime.config import JournalSettings, LinkSettings, RealtimeSettings, RobotConfig, config_from_table
+from mtm_onboard.runtime.source import Source
 from tests.onboard.schemes import FAKE_SECRET, small_scheme
 
 KEY = Key("fake-key", FAKE_SECRET, small_scheme())
@@ -72,16 +73,11 @@ def use(monkeypatch):
     return patch
 
 
-class Silence:
+class Silence(Source):
     """A source that no command ever comes from."""
-
-    refused = 0
 
     def poll(self, now_s: float) -> tuple[BodyVelocity, float, bool]:
         return STOP, -math.inf, False
-
-    def close(self) -> None:
-        pass
 
 
 def never() -> bool:

@@ -25,7 +25,7 @@ from tests.onboard.links.mavlink_spec import read_frames
 
 FORWARD = BodyVelocity(0.5, 0.0, 0.0)
 SET_MODE, ARM = 176, 400
-EXAMPLE = Path(__file__).parents[3] / "docs" / "robot.example.toml"
+EXAMPLE = Path(__file__).parents[3] / "examples/robots/mavlink.toml"
 
 
 class TestMavlinkCopterConforms(LinkConformance):
@@ -406,7 +406,7 @@ def test_the_configuration_s_kind_makes_it_and_a_wrong_option_is_one_sentence():
 
 def test_the_documented_options_are_those_it_takes_and_their_defaults(tmp_path):
     text = EXAMPLE.read_text(encoding="utf-8")
-    lines = text[text.index('# kind = "mavlink"') : text.index("[link]")].splitlines()
+    lines = text[text.index('kind = "mavlink"') : text.index("[limits]")].splitlines()
     options = tomllib.loads("\n".join(line.removeprefix("# ") for line in lines))
     key_file = tmp_path / options["signing_key_file"]
     key_file.touch(0o600)

@@ -39,7 +39,7 @@ def test_a_file_that_is_no_key_is_refused_without_showing_it(key_file, text):
 def test_a_missing_key_file_and_a_folder_are_one_sentence(tmp_path):
     with pytest.raises(MtmError, match="check the name"):
         load_signing_key(tmp_path / "missing.key")
-    with pytest.raises(MtmError, match="check the name"):
+    with pytest.raises(MtmError, match="not a file"):
         load_signing_key(tmp_path)
 
 

@@ -1,12 +1,8 @@
-import itertools
 import math
-import re
 import socket
 import threading
 import time
-import tomllib
 from contextlib import suppress
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -17,7 +13,6 @@ from mtm_onboard.links.base import LinkBusyError
 from mtm_onboard.links.factory import make_link
 from mtm_onboard.links.robomaster_plaintext import MOST_UNANSWERED
 from mtm_onboard.links.robomaster_tcp import RoboMasterTcp
-from mtm_onboard.links.robomaster_uart import RoboMasterUart
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
 from tests.onboard.links.conformance import LinkConformance, Rig
@@ -400,16 +395,6 @@ def test_a_robot_that_is_not_there_is_one_sentence():
 def test_a_host_that_is_no_ip_address_is_one_sentence(host):
     with pytest.raises(MtmError, match="give its IP address"):
         RoboMasterTcp(host)
-
-
-@pytest.mark.parametrize(("kind", "kept"), [("robomaster-uart", RoboMasterUart), ("robomaster-tcp", RoboMasterTcp)])
-def test_the_example_configuration_s_alternatives_make_a_link(kind, kept):
-    text = (Path(__file__).parents[3] / "docs" / "robot.example.toml").read_text()
-    section = text.split("[transport]")[1].split("\n[")[0]
-    lines = [line.removeprefix("# ") for line in section.splitlines() if re.match(r"# \w+ = ", line)]
-    start = next(number for number, line in enumerate(lines) if kind in line)
-    table = tomllib.loads("\n".join(itertools.takewhile(lambda line: "kind" not in line, lines[start + 1 :])))
-    assert isinstance(make_link(kind, table), kept)
 
 
 @pytest.mark.parametrize(("kind", "options"), [("robomaster-uart", {}), ("robomaster-tcp", {"hots": "x"})])

@@ -77,6 +77,18 @@ def test_environments_that_step_together_have_a_noise_each():
         assert np.array(env.unwrapped.got) == pytest.approx(played(40, symbol), abs=1e-6)
 
 
+def test_a_step_that_only_resets_takes_its_tick_by_step_count():
+    # Gymnasium's vector environments reset in the step after an episode's end, and its action reaches nobody.
+    step = 0
+    noise = KeyedNoise([Modulator(small_codebook(), "a", (1,))], tick=lambda: step)
+    envs = SyncVectorEnv([lambda: add_to_actions(Point(), noise)])
+    envs.reset()
+    for step in range(153):  # noqa: B007 - the noise reads it
+        envs.step(np.zeros((1, 2), dtype=np.float32))
+    reached = [tick for tick in range(153) if tick not in (50, 101, 152)]
+    assert np.array(envs.envs[0].unwrapped.got) == pytest.approx(played(153)[reached], abs=1e-6)
+
+
 def test_actions_of_another_kind_are_refused():
     discrete = Point()
     discrete.action_space = gymnasium.spaces.Discrete(3)

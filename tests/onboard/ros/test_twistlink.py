@@ -14,7 +14,7 @@ from mtm_onboard.runtime.modulator import Modulator
 from tests.hil.vehicles.floating_plant import FloatingPlant
 from tests.onboard.driven import Driven
 from tests.onboard.links.conformance import LinkConformance, Rig
-from tests.onboard.ros.fake_ros import Twist, Vector3, twist
+from tests.onboard.ros.twists import Twist, Vector3, twist
 from tests.onboard.schemes import small_codebook
 
 

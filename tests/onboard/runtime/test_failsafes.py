@@ -13,9 +13,9 @@ from mtm_onboard.journal.journal import Journal
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol.journal_file import JournalHeader, read_journal
 from mtm_onboard.runtime.client import BaseCommandClient
+from mtm_onboard.runtime.datagram_source import UdpSource
 from mtm_onboard.runtime.guard import Limits, Staleness
 from mtm_onboard.runtime.modulator import Modulator
-from mtm_onboard.runtime.source import UdpSource
 from tests.onboard.driven import Driven
 from tests.onboard.links.can_rig import LineRig, can_rig
 from tests.onboard.schemes import small_codebook

@@ -57,7 +57,7 @@ def test_an_interleaved_message_is_dealt_differently_from_slot_to_slot():
 
 def test_a_scheme_without_framing_carries_numbers_and_symbols():
     key = key_of(None)
-    assert message_of(77, key, 2) == PlainMessage(symbols_of_number(77, key.scheme), 2)
+    assert message_of(77, key, 2) == PlainMessage(symbols_of_number(77, key.scheme), 2, 77)
     assert message_of((1,) * 24, key).symbols(5) == (1,) * 24
 
 

@@ -181,7 +181,7 @@ def test_the_configuration_may_ask_for_it():
 
 
 def test_the_documented_section_is_one_that_can_be_asked_for():
-    text = (Path(__file__).parents[3] / "docs" / "robot.example.toml").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "examples/robots/none.toml").read_text(encoding="utf-8")
     _, *lines = text.partition("# [realtime]")[2].partition("\n\n")[0].splitlines()
     section = "\n".join(line.removeprefix("# ") for line in lines)
     assert config_from_table(table(**tomllib.loads(section))).realtime == RealtimeSettings(40, True, 3)

@@ -19,6 +19,10 @@ from mtm_onboard.runtime.tick import Runtime
 from tests.onboard.schemes import small_codebook
 
 BASE = BodyVelocity(0.3, -0.1, 0.5)
+HEADER = JournalHeader(
+    fingerprint="0" * 16, key_id="fake-key", robot="robot0", channel="a", symbols=(2,), repeat=True, rate_hz=50.0,
+    start_s=0.0, start_unix_s=None,
+)  # fmt: skip
 
 
 class Listener(Link):
@@ -106,9 +110,8 @@ def test_a_link_that_fails_stops_the_robot_and_the_run():
 
 
 def test_the_command_that_broke_the_link_is_in_the_journal_as_unsent(tmp_path):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (2,), True, 50.0, 0.0, None)
     stats, clock = LoopStats(), SimulatedClock()
-    with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
+    with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
         runtime = Runtime(message(), plain_guard(), HeldSource(), Listener(failing_from=3), journal)
         with pytest.raises(MtmError, match="told to stop"):
             run_loop(clock, 50.0, runtime.step, start_s=0.0, stop=lambda: False, stats=stats)
@@ -122,9 +125,8 @@ def test_the_journal_s_lateness_is_the_loop_s_with_missed_ticks(tmp_path):
         def sleep_until(self, deadline_s: float) -> None:
             super().sleep_until(deadline_s + (0.137 if abs(deadline_s - 0.1) < 1e-6 else 0.0))
 
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (2,), True, 50.0, 0.0, None)
     clock = Stalling()
-    with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
+    with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
         runtime = Runtime(message(), plain_guard(), HeldSource(), Listener(), journal)
         stats = run_loop(clock, 50.0, runtime.step, start_s=0.0, stop=lambda: clock.now() >= 0.5)
     assert read_journal(journal.path).lateness_s.max() == pytest.approx(0.137, abs=1e-6)
@@ -132,9 +134,8 @@ def test_the_journal_s_lateness_is_the_loop_s_with_missed_ticks(tmp_path):
 
 
 def test_a_link_that_doubts_is_told_of_in_the_journal_once(tmp_path):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (2,), True, 50.0, 0.0, None)
     link = Listener()
-    with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
+    with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
         runtime = Runtime(message(), plain_guard(), HeldSource(), link, journal)
         for tick in range(30):
             link.degraded = "no telemetry" if 10 <= tick < 20 else ""
