@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test lint bench mutants firmware deb deb-test clean
+.PHONY: setup demo test explore coverage lint bench mutants firmware deb deb-test clean
 
 setup: $(STAMP)
 
@@ -23,6 +23,13 @@ demo: setup
 
 test: setup lint
 	$(BIN)/pytest
+
+# Property tests with other examples each time; SEED=... repeats a search.
+SEED := $(or $(SEED),$(shell od -An -N4 -tu4 /dev/urandom | tr -d ' '))
+explore: setup
+	@echo 'to reproduce: make explore SEED=$(SEED)'
+	@MTM_HYPOTHESIS=explore $(BIN)/pytest -m hypothesis --hypothesis-seed=$(SEED) tests \
+	  || { echo 'to reproduce: make explore SEED=$(SEED)'; exit 1; }
 
 lint: setup
 	$(BIN)/ruff format --check --quiet .

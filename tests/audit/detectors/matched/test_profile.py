@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis.extra.numpy import arrays
 from hypothesis.strategies import floats
 
@@ -20,11 +20,13 @@ def certain_of(plant):
     return PlantProfile(np.eye(COUNT)[plant])
 
 
-@given(arrays(np.float64, COUNT, elements=floats(0.01, 1.0)))
+# One plant almost certain and the others all rounded alike is what loses most when weights are written short.
+@given(arrays(np.float64, COUNT, elements=floats(1e-9, 1.0)))
+@example(np.where(np.arange(COUNT) == 0, 1.0, 0.0101))
 def test_a_file_gives_back_what_was_written(tmp_path_factory, weights):
     path = tmp_path_factory.mktemp("profile") / "robot.profile"
     save_profile(PlantProfile(weights / weights.sum()), path)
-    assert load_profile(path).weights == pytest.approx(weights / weights.sum(), abs=1e-5)
+    assert load_profile(path).weights == pytest.approx(weights / weights.sum(), rel=1e-14, abs=0.0)
 
 
 def test_without_a_profile_every_time_of_returning_is_equally_likely_and_so_are_its_plants():
@@ -97,9 +99,9 @@ def faulty(edit):
         (lambda text: text.replace("lag_s", "lagging_s", 1), "plant 1 must have delay_s, lag_s, return_s, weight"),
         (lambda text: text.replace("weight = 0.0", "weight = -0.0", 1), "weight of plant 1 is -0.0"),
         (lambda text: text.replace("weight = 0.0", "weight = 0.9", 1), "the weights add up to 1.9"),
-        (lambda text: text.replace("weight = 0.031250", "weight = nan", 1), "the weight of plant 1 is nan"),
-        (lambda text: text.replace("weight = 0.031250", "weight = 'much'", 1), "plant 1 holds something that is not"),
-        (lambda text: text.replace("weight = 0.031250", "weight = true", 1), "plant 1 holds something that is not"),
+        (lambda text: text.replace("weight = 0.03125", "weight = nan", 1), "the weight of plant 1 is nan"),
+        (lambda text: text.replace("weight = 0.03125", "weight = 'much'", 1), "plant 1 holds something that is not"),
+        (lambda text: text.replace("weight = 0.03125", "weight = true", 1), "plant 1 holds something that is not"),
         (lambda text: text[:200], "is no profile"),
         (lambda text: "\x00", "is no profile"),
     ],
