@@ -47,7 +47,7 @@ deb-test: setup
 	MTM_CLEAN_ROOT=1 $(BIN)/pytest tests/packaging/test_clean_root.py -s
 
 mutants: setup
-	$(BIN)/python -m tests.mutation
+	$(BIN)/python -m tests.mutation $(if $(SECONDS),--seconds $(SECONDS))
 
 bench: setup
 	$(BIN)/pytest tests/benchmarks --benchmark-enable -s

@@ -19,6 +19,7 @@ from mtm_audit.decoding.decode import DecodeSettings
 from mtm_audit.model.picture import Frame
 from mtm_onboard.protocol import save_key
 from tests.audit.moving_robot import FAKE_SECRET, OTHER_SECRET, key_of, robot_track, scheme_of
+from tests.patience import PATIENCE_S
 
 KEY = key_of(scheme_of(symbols=(1, 1), ticks=400))
 ROOT = Path(__file__).parents[2]
@@ -262,7 +263,7 @@ def test_control_c_during_the_work_leaves_nothing_half_done(folder, tmp_path):
     # Loading takes a moment; what comes before it must end well, too, so the exact instant does not matter.
     time.sleep(1.5)
     busy.send_signal(signal.SIGINT)
-    out, _ = busy.communicate(timeout=30)
+    out, _ = busy.communicate(timeout=PATIENCE_S)
     assert busy.returncode in (130, -signal.SIGINT)
     assert out == ""
     assert list(tmp_path.iterdir()) == []

@@ -18,6 +18,7 @@ from mtm_audit.readers.motion_capture import read_tum
 from mtm_audit.readers.video import read_frames
 from mtm_onboard.cli import main as onboard
 from mtm_onboard.protocol import load_key
+from tests.patience import PATIENCE_S, until
 
 QUICK = ["record", "--seconds", "2", "--wire", "direct"]
 
@@ -147,12 +148,9 @@ def test_a_program_that_is_asked_to_end_leaves_nothing(tmp_path, request_to_end,
     # Programs in the background inherit that interrupts are ignored, and this one is to be interrupted.
     heed = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
     started = subprocess.Popen([program("mtm-hil"), *wanted], stderr=subprocess.PIPE, preexec_fn=heed)
-    deadline_s = time.monotonic() + 20.0
-    while not list(tmp_path.iterdir()):
-        assert time.monotonic() < deadline_s
-        time.sleep(0.02)
+    until(lambda: list(tmp_path.iterdir()))
     started.send_signal(request_to_end)
-    _, error = started.communicate(timeout=20.0)
+    _, error = started.communicate(timeout=PATIENCE_S)
     assert (started.returncode, error.count(b"\n")) == (code, says)
     assert list(tmp_path.iterdir()) == []
 

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 _COMPARISONS = {
     ast.Lt: (ast.LtE, ast.GtE), ast.LtE: (ast.Lt, ast.Gt), ast.Gt: (ast.GtE, ast.LtE), ast.GtE: (ast.Gt, ast.Lt),
     ast.Eq: (ast.NotEq,), ast.NotEq: (ast.Eq,), ast.Is: (ast.IsNot,), ast.IsNot: (ast.Is,),
+    ast.In: (ast.NotIn,), ast.NotIn: (ast.In,),
 }  # fmt: skip
 _OPERATORS = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult,
-    ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd,
+    ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd, ast.BitXor: ast.BitOr, ast.LShift: ast.RShift, ast.RShift: ast.LShift,
+    ast.FloorDiv: ast.Mult, ast.Mod: ast.FloorDiv,
 }  # fmt: skip
 _NAMES = {"min": "max", "max": "min"}
 
@@ -62,7 +64,7 @@ def _replacements(node: ast.AST) -> Iterator[ast.AST]:
         for place, old in enumerate(node.ops):
             for other in _COMPARISONS.get(type(old), ()):
                 yield ast.Compare(node.left, [*node.ops[:place], other(), *node.ops[place + 1 :]], node.comparators)
-    elif isinstance(node, ast.If | ast.IfExp):
+    elif isinstance(node, ast.If | ast.IfExp) and not _is_for_type_checkers(node):
         for value in (True, False):
             changed = copy.copy(node)
             changed.test = ast.Constant(value)
@@ -84,6 +86,10 @@ def _replacements(node: ast.AST) -> Iterator[ast.AST]:
         yield ast.Name(_NAMES[node.id], node.ctx)
     elif _is_left_out_easily(node):
         yield ast.Pass()
+
+
+def _is_for_type_checkers(node: ast.If | ast.IfExp) -> bool:
+    return isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
 
 
 def _is_left_out_easily(node: ast.AST) -> bool:

@@ -12,9 +12,7 @@ from mtm_onboard.links.robomaster_uart import RoboMasterUart
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from tests.hil.vehicles.floating_plant import FloatingPlant
 from tests.onboard.links.plaintext_rig import free_udp_port
-
-# The kernel passes bytes along in its own time, so these tests wait for them, briefly.
-PATIENCE_S = 5.0
+from tests.patience import PATIENCE_S
 
 
 def until(condition, act=lambda: None):

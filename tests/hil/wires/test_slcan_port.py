@@ -13,9 +13,7 @@ from hil.wires.slcan_port import SlcanPort
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from tests.hil.vehicles.floating_plant import FloatingPlant
-
-# The kernel passes bytes along a pseudo-terminal in its own time, so these tests wait for them, briefly.
-PATIENCE_S = 5.0
+from tests.patience import PATIENCE_S
 
 
 @pytest.fixture

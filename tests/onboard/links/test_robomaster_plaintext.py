@@ -21,6 +21,8 @@ from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
 from tests.onboard.links.conformance import Rig, TransportConformance
 from tests.onboard.links.plaintext_rig import OverSocket, free_udp_port, plaintext_rig
+from tests.onboard.links.stalled_line import StalledLine
+from tests.patience import PATIENCE_S
 
 FORWARD = BodyVelocity(0.5, 0.0, 0.0)
 OPENING = (
@@ -28,8 +30,6 @@ OPENING = (
     b"chassis push position on pfreq 10 attitude on afreq 10 seq 3;"
 )
 RELEASE = 3 * b"chassis speed x 0.0000 y 0.0000 z 0.000;" + 2 * b"quit;"
-# What a busy machine may add to a wait.
-STALL_S = 0.25
 
 
 class TestRoboMasterPlaintextConforms(TransportConformance):
@@ -46,7 +46,7 @@ class TestRoboMasterPlaintextConforms(TransportConformance):
 def line():
     """A transport and the far end of its line, where nobody answers."""
     ours, theirs = socket.socketpair()
-    theirs.settimeout(5.0)
+    theirs.settimeout(PATIENCE_S)
     with ours, theirs:
         yield OverSocket(ours), theirs
 
@@ -236,14 +236,14 @@ def test_a_robot_that_closes_the_line_is_a_link_that_is_down(line):
         transport.send(FORWARD)
 
 
-def test_a_blocked_line_delays_a_command_by_no_more_than_the_bound(line):
+def test_a_blocked_line_delays_a_command_by_no_more_than_the_bound(line, monkeypatch):
     transport, _ = line
     transport.open()
     fill(transport._end)
-    began_s = time.monotonic()
+    stalled = StalledLine().install(monkeypatch)
     with pytest.raises(LinkBusyError):
         transport.send(FORWARD)
-    assert time.monotonic() - began_s < transport.write_bound_s + STALL_S
+    assert stalled.waited_s <= transport.write_bound_s
     assert transport.link_errors == 1
 
 
@@ -261,22 +261,14 @@ def test_a_stop_that_cannot_be_sent_says_so_and_the_line_is_still_released(line)
     far.setblocking(False)
 
 
-def test_a_stop_waits_longer_for_a_line_than_a_command_does(line):
+def test_a_stop_waits_longer_for_a_line_than_a_command_does(line, monkeypatch):
     transport, far = line
     transport.open()
     fill(transport._end)
-    texts = []
-
-    def read_late():
-        time.sleep(4 * transport.write_bound_s)
-        while not (texts and texts[-1].endswith(b"quit;")):
-            texts.append(arrived(far))
-
-    reader = threading.Thread(target=read_late)
-    reader.start()
+    stalled = StalledLine(4 * transport.write_bound_s, make_room=lambda: arrived(far)).install(monkeypatch)
     transport.stop()
-    reader.join()
-    assert b"".join(texts).endswith(RELEASE)
+    assert stalled.waited_s >= 4 * transport.write_bound_s
+    assert arrived(far).endswith(RELEASE)
 
 
 def test_an_opening_that_fails_half_way_releases_the_line(line):
@@ -366,7 +358,7 @@ def test_mangled_answers_never_answer_more_than_was_sent(parts):
 def test_over_tcp_telemetry_comes_by_udp_and_a_stranger_s_is_not_looked_at():
     with plaintext_rig("tcp") as rig, rig.transport:
         rig.transport.send(FORWARD)
-        deadline_s = time.monotonic() + 5.0
+        deadline_s = time.monotonic() + PATIENCE_S
         while rig.transport.telemetry is None or rig.transport.telemetry.heading_rad is None:
             assert time.monotonic() < deadline_s
             rig.run(0.02)
