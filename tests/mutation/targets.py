@@ -36,7 +36,7 @@ def _runtime(name: str, *tests: str) -> Target:
 
 TARGETS = (
     _runtime("guard", "test_guard", "test_tick", "test_failsafes"),
-    _runtime("tick", "test_tick", "test_failsafes"),
+    _runtime("tick", "test_tick_link", "test_tick"),
     _runtime("loop", "test_loop"),
     _runtime("message", "test_message"),
     _runtime("modulator", "test_modulator"),

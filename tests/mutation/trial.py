@@ -1,5 +1,6 @@
 """One mutant's trial: the tests run in a process of its own, with the mutant in the place of the module."""
 
+import gc
 import importlib.abc
 import importlib.util
 import math
@@ -52,6 +53,8 @@ def survives(target: Target, source: str, longest_cpu_s: float) -> bool:
     A mutant that comes to no end has been noticed: no file of tests may take more than `longest_cpu_s` of processor
     time, which a busy machine does not stretch.
     """
+    # What is there already is no garbage of the children's, who would look through it several times.
+    gc.freeze()
     if target.module in sys.modules:
         raise RuntimeError(f"{target.module} was imported already, so that no mutant would take its place")
     return all(_passes(target, source, tests, longest_cpu_s) for tests in target.tests)

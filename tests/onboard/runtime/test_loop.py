@@ -127,3 +127,39 @@ def test_lateness_takes_the_same_memory_after_any_number_of_ticks():
         lateness.record(count * 1e-3)
     assert len(vars(lateness)["_counts"]) == size
     assert Lateness().quantile_s(0.5) == 0.0
+
+
+def test_a_quantile_is_the_upper_edge_of_one_of_twenty_bins_a_decade():
+    lateness = Lateness()
+    for delay_s in (1e-9, 1e-9, 1e-9, 1.23e-3, 5.0):
+        lateness.record(delay_s)
+    assert lateness.quantile_s(0.5) == 1e-6
+    assert lateness.quantile_s(0.8) == pytest.approx(1e-6 * 10 ** (62 / 20))
+    assert lateness.quantile_s(1.0) == 5.0
+
+
+def test_what_is_later_than_ten_seconds_counts_as_ten():
+    lateness = Lateness()
+    lateness.record(50.0)
+    assert lateness.quantile_s(1.0) == pytest.approx(10.0)
+    assert lateness.worst_s == 50.0
+
+
+def test_a_wake_up_exactly_on_a_later_deadline_is_of_that_tick():
+    calls, stats = run(SlowClock([0, 0, 0.04]), 0.15)
+    assert [tick for tick, _ in calls] == [0, 1, 4, 5, 6, 7]
+    assert stats.missed == 2
+
+
+def test_a_step_that_takes_exactly_a_period_is_no_overrun():
+    clock = SimulatedClock()
+    # A sixty-fourth of a second has an exact floating-point number.
+    stats = run_loop(
+        clock, 64.0, lambda _, now_s: clock.sleep_until(now_s + 1 / 64), start_s=0.0, stop=lambda: clock.now() >= 1.0
+    )
+    assert (stats.overruns, stats.missed) == (0, 0)
+
+
+def test_a_loop_may_be_slower_than_one_hertz():
+    calls, _ = run(SimulatedClock(), 9.0, rate_hz=0.5)
+    assert [tick for tick, _ in calls] == [0, 1, 2, 3, 4]

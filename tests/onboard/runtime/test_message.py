@@ -50,6 +50,14 @@ def test_under_the_fixed_schedule_every_slot_is_the_same_and_of_the_scheme_s_epo
     assert frame.payload == "hi"
 
 
+def test_messages_count_from_zero():
+    key = key_of()
+    assert (PlainMessage((0,) * 24).number, FramedMessage("hi", key).number) == (0, 0)
+    played = FramedMessage("hi", key).symbols(0)
+    assert decode_frame(in_frame_order(played, key.scheme, 0), key.scheme, key.secret, epoch=4).number == 0
+    assert message_of("hi", key).number == 0
+
+
 def test_an_interleaved_message_is_dealt_differently_from_slot_to_slot():
     message = FramedMessage("hi", key_of())
     assert message.symbols(10) != message.symbols(11)
