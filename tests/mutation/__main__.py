@@ -24,7 +24,7 @@ _TIMES, _LEAST_S = 3.0, 2.0
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run; exit code 0 when every mutant was killed or is explained, 1 when not, 3 when time ran out before all were tried."""
+    """Run; exit code 0 when every mutant was killed or is explained, 1 when not, 3 when not all were tried in time."""
     known = [target.module for target in TARGETS]
     parser = argparse.ArgumentParser(prog="python -m tests.mutation")
     parser.add_argument("modules", nargs="*", metavar="MODULE", help="only these; all when none is named")

@@ -1,10 +1,12 @@
 import os
+from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_onboard.protocol import Channel, Key, MtmError, Scheme, generate_key, load_key, save_key
+from mtm_onboard.protocol import Channel, Codebook, Key, MtmError, Scheme, generate_key, load_key, save_key
 from mtm_onboard.protocol.key import key_text
 
 FAKE_SECRET = b"not a real secret, only for test"
@@ -104,6 +106,25 @@ def test_missing_folder_and_binary_files_are_refused(tmp_path):
     os.chmod(binary, 0o600)
     with pytest.raises(MtmError, match="not text"):
         load_key(binary)
+
+
+def test_a_scheme_that_is_no_table_is_refused(written):
+    text = written.read_text()
+    written.write_text(text[: text.index("[scheme]")] + "scheme = 3\n")
+    with pytest.raises(MtmError, match="the scheme must be a table"):
+        load_key(written)
+
+
+def test_what_is_no_regular_file_is_refused():
+    with pytest.raises(MtmError, match="/dev/null is not a file; name a key file"):
+        load_key(Path("/dev/null"))
+
+
+def test_a_key_s_codebook_is_that_of_its_secret_and_scheme():
+    key = Key("fake-key", FAKE_SECRET, SCHEME)
+    channel, own = SCHEME.channels[0], Codebook(FAKE_SECRET, SCHEME, 5)
+    assert np.array_equal(key.codebook(5).samples(channel, 1), own.samples(channel, 1))
+    assert (key.codebook().first_slot, key.codebook(5).first_slot) == (0, 5)
 
 
 def test_key_ids_are_plain_words():

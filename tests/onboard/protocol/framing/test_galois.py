@@ -20,3 +20,9 @@ def test_the_parity_is_that_of_an_independent_library(data):
 
 def test_nothing_but_zeros_has_zeros_for_parity():
     assert parity_of([0] * 10, 4, 8) == [0] * 4
+
+
+def test_a_generator_may_lack_powers():
+    # In GF(4) the roots 1, 2 and 3 are all there are: their generator is x^3 + 1, so that parity is the last symbol.
+    assert parity_of([2], 3, 2) == [0, 0, 2]
+    assert parity_of([2, 1], 3, 2) == [0, 2, 1]

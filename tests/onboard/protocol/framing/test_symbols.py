@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from mtm_onboard.protocol import Channel, MtmError, Scheme
 from mtm_onboard.protocol.framing import (
     channel_symbols,
+    check_symbols,
     number_of_symbols,
     payload_bits,
     symbols_of_number,
@@ -51,3 +52,21 @@ def test_in_the_same_mode_every_channel_plays_the_whole_message():
     assert channel_symbols((1, 3), scheme) == {"x": (1, 3), "y": (1, 3)}
     with pytest.raises(MtmError, match="3 symbols given"):
         channel_symbols((1, 2, 3), scheme)
+
+
+@pytest.mark.parametrize("symbol", [-1, 4])
+def test_symbols_outside_the_alphabet_are_refused(symbol):
+    scheme = split(4, [1, 1])
+    assert check_symbols([0, 3], scheme) == (0, 3)
+    with pytest.raises(MtmError, match=f"symbol {symbol} is outside the alphabet; choose 0 to 3"):
+        check_symbols([0, symbol], scheme)
+
+
+def test_numbers_fill_whole_bits_and_no_more():
+    scheme = split(3, [2])
+    assert payload_bits(scheme) == 3
+    assert symbols_of_number(7, scheme) == (2, 1)
+    assert number_of_symbols((2, 1), scheme) == 7
+    for number in (-1, 8):
+        with pytest.raises(MtmError, match="3 bits, 0 to 7"):
+            symbols_of_number(number, scheme)
