@@ -174,7 +174,7 @@ def test_a_run_to_a_message_s_end_sends_it_and_says_so(tmp_path, key, capsys):
     assert loaded.secret.hex() not in (tmp_path / "journal.csv").read_text()
 
 
-def test_robots_that_are_told_the_same_start_share_it_and_one_that_comes_late_joins_in_the_middle(tmp_path, key):
+def test_a_robot_that_comes_late_joins_in_the_middle(tmp_path, key):
     configure(tmp_path)
     started = time.time() - 5.0
     process = start(tmp_path, "--message", "99", "--start-at", str(started))
@@ -189,7 +189,7 @@ def test_robots_that_are_told_the_same_start_share_it_and_one_that_comes_late_jo
 
 
 @pytest.mark.realtime
-def test_lines_on_standard_input_become_motion_with_the_message_on_it(tmp_path, key):
+def test_lines_on_standard_input_become_motion(tmp_path, key):
     configure(tmp_path)
     process = start(tmp_path, "--symbols", "3,1,0,2", "--stdin")
     assert process.stdin is not None
@@ -218,7 +218,7 @@ def noisy_ticks(folder: Path) -> int:
 
 
 @pytest.mark.realtime
-def test_an_interrupt_ends_a_run_on_a_controller_s_commands_with_nothing_wrong(tmp_path, key):
+def test_an_interrupt_ends_a_controller_s_run_with_nothing_wrong(tmp_path, key):
     configure(tmp_path)
     process = start(tmp_path, "--no-message")
     client = BaseCommandClient(PORT)
@@ -235,7 +235,7 @@ def test_an_interrupt_ends_a_run_on_a_controller_s_commands_with_nothing_wrong(t
 
 
 @pytest.mark.realtime
-def test_a_run_outlives_its_key_file_and_its_journal_outlives_the_run(tmp_path, key):
+def test_a_journal_outlives_the_run_and_a_run_its_key_file(tmp_path, key):
     configure(tmp_path)
     process = start(tmp_path, "--symbols", "3,1,0,2", "--stdin")
     assert process.stdin is not None

@@ -64,7 +64,7 @@ def test_a_rolling_schedule_plays_new_waveforms_in_every_window():
     assert np.argmax(reading.window_scores, axis=1).tolist() == [1, 1]
 
 
-def test_posteriors_are_sure_of_what_was_sent_and_unsure_of_chance(glimpse):
+def test_posteriors_are_sure_of_what_was_sent_not_of_chance(glimpse):
     detector = CoherencyDetector()
     key, *decoys = read(KEY, glimpse, 1.0, decoys=10)
     sure = detector.posteriors(key, decoys)
@@ -83,7 +83,7 @@ def scored(scores):
 
 
 # Null scores of position 0: mean 0.2, variance 0.01; of position 1: mean 0.3, variance 0.04; of both: 0.25 and 0.0275.
-NULL = [scored([[0.1, 0.3], [0.1, 0.5]]), scored([[0.3, 0.1], [0.5, 0.1]])]
+NULL = [scored([[0.1, 0.3], [0.1, 0.5]]), scored([[0.1, 0.3], [0.5, 0.1]])]
 
 
 def test_posteriors_are_those_of_a_gaussian_shift():
@@ -132,7 +132,7 @@ def test_a_track_with_too_few_axes_is_refused():
         read(KEY, glimpse_of_track(flat), 0.0)
 
 
-def test_a_channel_s_axes_are_found_by_name_among_those_of_the_track(glimpse):
+def test_a_channel_s_axes_are_found_in_the_track_by_name(glimpse):
     sideways = Glimpse("robot0", glimpse.edges_s, glimpse.velocities[:, ::-1], glimpse.valid, ("y", "x"))
     turned = rate_searched_scores(KEY.codebook(), CHANNEL, sideways, 1.0)
     assert turned == pytest.approx(rate_searched_scores(KEY.codebook(), CHANNEL, glimpse, 1.0))
@@ -144,7 +144,7 @@ def test_axes_without_a_name_in_common_are_taken_in_order(glimpse):
     assert taken == pytest.approx(rate_searched_scores(KEY.codebook(), CHANNEL, glimpse, 1.0))
 
 
-def test_a_detector_that_does_not_exist_is_refused_with_the_ones_that_do():
+def test_a_detector_that_does_not_exist_is_refused():
     with pytest.raises(MtmError, match="coherency"):
         make_detector("guessing")
 

@@ -57,11 +57,11 @@ def framed_run(framing: Framing, payload, schedule="fixed") -> RunSettings:
         (framed_run(Framing("bytes", 8), b"\x0f"), ["--hex", "0f"]),
     ],
 )
-def test_the_programs_are_told_the_message_as_their_command_line_takes_it(settings, arguments):
+def test_the_programs_are_told_the_message_by_their_options(settings, arguments):
     assert _content(settings) == arguments
 
 
-def test_a_rolling_run_in_real_time_is_later_by_what_remains_until_a_slot_begins():
+def test_a_rolling_run_in_real_time_waits_for_a_slot():
     settings = framed_run(Framing("integer", 8), 77, "rolling")
     aligned, start_unix_s = _aligned(settings, 1_800_000_001.5)
     assert start_unix_s == 1_800_000_006.0
@@ -72,7 +72,7 @@ def test_a_rolling_run_in_real_time_is_later_by_what_remains_until_a_slot_begins
 
 @pytest.mark.realtime
 @pytest.mark.parametrize("wire", ["can", "plaintext", "mavlink"])
-def test_four_onboard_programs_drive_four_robots_through_serial_devices_or_udp(tmp_path, wire):
+def test_four_programs_drive_four_robots_in_real_time(tmp_path, wire):
     settings, result, folder = in_time(short_run(key=fake_key(100), wire=wire), tmp_path)
     assert [robot.name for robot in result.robots] == ["robot0", "robot1", "robot2", "robot3"]
     assert all(robot.is_stopped and robot.faults == 0 for robot in result.robots), result.robots

@@ -82,7 +82,7 @@ def test_a_copter_goes_to_the_right_and_a_rover_only_faster(name):
 
 
 @pytest.mark.parametrize("name", ["copter", "px4"])
-def test_a_velocity_in_the_local_frame_is_towards_north_and_east_whatever_the_heading(name):
+def test_a_local_velocity_is_towards_north_and_east(name):
     companion = Companion(name, is_guided=True, is_armed=True)
     for _ in range(50):
         companion.setpoint(yaw_rate=-1.0)
@@ -130,7 +130,7 @@ def test_set_points_move_nothing_outside_the_mode_or_disarmed(name, state):
 
 
 @pytest.mark.parametrize(("name", "seconds"), [("copter", 3.0), ("rover", 3.0), ("px4", 1.0)])
-def test_a_vehicle_stops_when_set_points_cease_and_px4_leaves_offboard(name, seconds):
+def test_a_vehicle_stops_when_set_points_cease(name, seconds):
     companion = Companion(name, is_guided=True, is_armed=True)
     companion.setpoint(vx=0.5)
     companion.run(seconds - 0.05)
@@ -171,7 +171,7 @@ def test_a_stream_that_has_ended_is_not_enough():
 
 
 @pytest.mark.parametrize(("name", "number"), [("copter", 4.0), ("rover", 15.0)])
-def test_ardupilot_changes_modes_when_asked_and_arms_when_its_checks_pass(name, number):
+def test_ardupilot_changes_modes_and_arms_when_its_checks_pass(name, number):
     companion = Companion(name)
     assert companion.ask(SET_MODE, 1.0, number) == [ACCEPTED]
     assert companion.ask(ARM, 1.0) == [ACCEPTED]
@@ -205,7 +205,7 @@ def test_requests_that_make_no_sense_change_nothing(request_, answer):
     assert companion.ask(*request_, system=9) == []
 
 
-def test_it_says_what_it_is_once_a_second_and_how_it_moves_ten_times():
+def test_it_says_what_it_is_each_second_and_moves_ten_times():
     companion = Companion("rover", is_guided=True)
     companion.run(5.0)
     heard = companion.heard()

@@ -97,14 +97,14 @@ def test_a_run_opens_the_link_and_leaves_it_stopped_and_closed(config, use):
     assert "journal" not in outcome.summary()
 
 
-def test_a_run_that_is_asked_to_end_at_once_sends_nothing_but_the_stop(config, use):
+def test_a_run_that_is_to_end_at_once_sends_only_the_stop(config, use):
     link = use(Link())
     assert run_session(config, KEY, Plan(None), lambda: True).stats.sent == 0
     assert link.events == ["open", "stop", "stop", "close"]
 
 
 @pytest.mark.parametrize(("failing", "sentence"), [("send", "cable pulled"), ("service", "no heartbeat")])
-def test_a_link_that_fails_on_the_way_stops_the_robot_and_is_an_error(config, use, failing, sentence):
+def test_a_link_that_fails_on_the_way_stops_the_robot(config, use, failing, sentence):
     link = use(Link(failing))
     with pytest.raises(MtmError, match=sentence):
         run_session(config, KEY, Plan((0, 1, 2, 3)), never)
@@ -120,7 +120,7 @@ def test_a_link_that_does_not_open_is_an_error(config, use):
     assert link.sent == 0
 
 
-def test_what_does_not_fit_the_key_is_refused_before_the_link_is_opened(config, use):
+def test_what_does_not_fit_the_key_is_refused_before_the_link(config, use):
     link = use(Link())
     arm = replace(KEY, scheme=small_scheme(channels=(Channel("a", "arm", ("shoulder",), 1, 0.1),)))
     for key, message in ((KEY, (0, 1)), (arm, (1,))):
@@ -131,7 +131,7 @@ def test_what_does_not_fit_the_key_is_refused_before_the_link_is_opened(config, 
     assert link.events == []
 
 
-def test_a_link_that_may_come_back_is_opened_anew_and_its_losses_are_told(config, use):
+def test_a_link_that_comes_back_is_opened_and_its_losses_told(config, use):
     link = use(Link("send"))
     config = replace(config, link=LinkSettings())
     plan = Plan((0, 1, 2, 3), duration_s=30.0)
@@ -153,7 +153,7 @@ def test_steps_of_the_system_s_time_do_not_touch_a_run(config, use, monkeypatch)
     assert stats.missed < 50 * PATIENCE_S
 
 
-def test_the_robot_is_told_to_stop_before_a_wedged_thread_is_waited_for(config, use, monkeypatch):
+def test_the_robot_stops_before_a_wedged_thread_is_waited_for(config, use, monkeypatch):
     monkeypatch.setattr("mtm_onboard.runtime.service._LONGEST_FAREWELL_S", 20.0)
 
     class Wedged(Link):
@@ -174,7 +174,7 @@ def test_the_robot_is_told_to_stop_before_a_wedged_thread_is_waited_for(config, 
     assert link.events == ["open", "stop", "stop", "close"]
 
 
-def test_the_service_manager_hears_of_the_loop_from_the_loop_itself(config, use, tmp_path, monkeypatch):
+def test_the_service_manager_hears_of_the_loop_by_the_loop(config, use, tmp_path, monkeypatch):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(str(tmp_path / "notify"))
         manager.setblocking(False)
@@ -235,7 +235,7 @@ def heard(manager: socket.socket) -> list[bytes]:
             return words
 
 
-def test_what_the_system_refuses_of_real_time_is_told_and_the_run_goes_on(config, use, capsys):
+def test_refused_real_time_is_told_and_the_run_goes_on(config, use, capsys):
     link = use(Link())
     config = replace(config, realtime=RealtimeSettings(cpu=1023))
     run_session(config, KEY, Plan(None), lambda: link.sent > 0)

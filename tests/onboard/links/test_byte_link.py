@@ -79,7 +79,7 @@ def test_a_message_that_could_not_begin_to_leave_is_forgotten(ends):
 
 
 @given(st.lists(st.tuples(st.integers(1, 3000), st.integers(0, 4000)), min_size=1, max_size=40))
-def test_whatever_the_line_takes_at_a_time_no_message_follows_half_of_another(steps):
+def test_no_message_follows_half_of_another(steps):
     ours, theirs = socket.socketpair()
     with ours, theirs:
         ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
@@ -109,7 +109,7 @@ def test_whatever_the_line_takes_at_a_time_no_message_follows_half_of_another(st
         assert written <= set(whole)
 
 
-def test_a_silent_line_reads_as_nothing_and_a_closed_one_says_so_after_the_last_words(ends):
+def test_a_silent_line_reads_as_nothing_and_a_closed_one_says_so(ends):
     link, far = ends
     assert link.read() == b""
     far.send(b"bye;")
@@ -166,7 +166,7 @@ def test_a_robot_that_nobody_reaches_is_one_sentence(port):
         tcp_link("127.0.0.1", port)
 
 
-def test_closing_a_connection_with_unread_answers_does_not_recall_the_last_command():
+def test_closing_does_not_recall_the_last_command():
     with socket.create_server(("127.0.0.1", 0)) as server:
         link = tcp_link(*server.getsockname())
         far, _ = server.accept()

@@ -62,7 +62,7 @@ def commands(frames):
 RELEASE = [(0x3F, 0x21, bytes(12)), (0x3F, 0x19, b"\x00")]
 
 
-def test_opening_subscribes_engages_and_stands_still_in_that_order():
+def test_opening_subscribes_engages_and_stands_still():
     with can_rig() as rig:
         rig.transport.open()
         assert [command[:2] for command in commands(rig.sent())] == [
@@ -75,7 +75,7 @@ def test_opening_subscribes_engages_and_stands_still_in_that_order():
         assert len(rig.sent()) == OPENING_FRAMES
 
 
-def test_every_message_starts_a_frame_of_its_own_on_the_controllers_id():
+def test_every_message_starts_a_frame_of_its_own():
     with can_rig() as rig, rig.transport:
         rig.transport.send(FORWARD)
         rig.run(0.1)
@@ -84,7 +84,7 @@ def test_every_message_starts_a_frame_of_its_own_on_the_controllers_id():
         assert all(frame.arbitration_id == 0x201 and not frame.is_extended_id for frame in rig.sent())
 
 
-def test_a_heartbeat_goes_out_each_ten_milliseconds_with_its_own_number():
+def test_a_heartbeat_goes_out_each_ten_milliseconds():
     with can_rig() as rig, rig.transport:
         rig.run(1.0)
         messages = Parser().feed(b"".join(bytes(frame.data) for frame in rig.sent()))
@@ -95,7 +95,7 @@ def test_a_heartbeat_goes_out_each_ten_milliseconds_with_its_own_number():
         assert rig.node.heartbeats >= 99
 
 
-def test_missed_heartbeats_are_skipped_and_counted_and_the_schedule_stays():
+def test_missed_heartbeats_are_skipped_and_counted():
     with can_rig() as rig, rig.transport:
         transport = rig.transport
         for now_s in (5.0, 5.004, 5.057, 5.059, 5.061):
@@ -154,7 +154,7 @@ def test_stop_tries_again_until_both_commands_are_out():
     assert transport.bus_errors == 3
 
 
-def test_a_stop_that_cannot_be_sent_says_so_after_a_few_tries_and_the_bus_is_still_released():
+def test_a_stop_that_cannot_be_sent_still_releases_the_bus():
     bus = BrokenBus(range(OPENING_FRAMES + 1, 10_000))
     with pytest.raises(MtmError, match="switch the robot off"), RoboMasterCan(bus):
         pass
@@ -162,7 +162,7 @@ def test_a_stop_that_cannot_be_sent_says_so_after_a_few_tries_and_the_bus_is_sti
     assert bus.is_shut_down
 
 
-def test_an_opening_that_fails_half_way_releases_the_motors_and_the_bus():
+def test_an_opening_that_fails_half_way_releases_the_bus():
     bus = BrokenBus({OPENING_FRAMES})
     with pytest.raises(MtmError, match="refused a frame"):
         RoboMasterCan(bus).open()
@@ -170,7 +170,7 @@ def test_an_opening_that_fails_half_way_releases_the_motors_and_the_bus():
     assert bus.is_shut_down
 
 
-def test_a_bus_error_in_a_heartbeat_is_counted_and_does_not_end_the_service():
+def test_a_bus_error_in_a_heartbeat_does_not_end_the_service():
     bus = BrokenBus({OPENING_FRAMES + 1})
     transport = RoboMasterCan(bus)
     transport.open()
@@ -198,7 +198,7 @@ class SlowBus(BrokenBus):
 
 
 @pytest.mark.parametrize("full", [True, False])
-def test_a_slow_bus_holds_a_command_up_for_no_longer_than_the_write_bound(monkeypatch, full):
+def test_a_slow_bus_holds_a_command_no_longer_than_the_bound(monkeypatch, full):
     bus = SlowBus(full=full)
     monkeypatch.setattr("mtm_onboard.links.can_stream.time.monotonic", lambda: bus.now_s)
     transport = RoboMasterCan(bus)
@@ -233,7 +233,7 @@ def test_a_full_transmit_queue_is_a_busy_bus_and_no_broken_one():
     transport.send(FORWARD)
 
 
-def test_a_serial_adapter_is_never_waited_for_until_it_has_drained(monkeypatch):
+def test_a_serial_adapter_is_never_waited_for(monkeypatch):
     port = SlcanPort()
     transport = RoboMasterCan(interface="slcan", channel=port.path, sleep_after_open=0)
     transport.open()
@@ -245,7 +245,7 @@ def test_a_serial_adapter_is_never_waited_for_until_it_has_drained(monkeypatch):
     port.shutdown()
 
 
-def test_the_port_of_an_adapter_that_takes_no_farewell_is_released():
+def test_an_adapter_that_takes_no_farewell_is_released():
     class Gone(BrokenBus):
         def shutdown(self):
             raise can.CanOperationError("Could not write to serial device")
@@ -257,7 +257,7 @@ def test_the_port_of_an_adapter_that_takes_no_farewell_is_released():
     assert closed == [True]
 
 
-def test_a_command_does_not_wait_longer_for_a_heartbeat_that_is_stuck():
+def test_a_command_does_not_wait_for_a_stuck_heartbeat():
     transport = RoboMasterCan(BrokenBus(()))
     transport.open()
     with vars(transport)["_lock"], pytest.raises(LinkBusyError, match="still busy"):
@@ -294,7 +294,7 @@ def test_a_link_needs_either_a_bus_or_its_options(arguments):
         RoboMasterCan(**arguments)
 
 
-def test_commands_and_heartbeats_from_two_threads_never_mix_their_frames():
+def test_two_threads_never_mix_their_frames():
     with can_rig() as rig, rig.transport:
         rig.transport.write_bound_s = 10.0  # a beating thread that never pauses leaves the lock to chance
         beating = threading.Thread(target=lambda: [rig.transport.service(0.01 * beat) for beat in range(300)])
@@ -318,7 +318,7 @@ def test_an_answer_with_an_error_code_is_counted(code, refusals):
         assert rig.transport.refusals == refusals
 
 
-def test_a_robot_that_hears_nothing_more_is_stopped_by_its_own_deadman():
+def test_a_robot_that_hears_nothing_is_stopped_by_its_deadman():
     with can_rig(deadman_s=0.2) as rig, rig.transport:
         rig.transport.send(FORWARD)
         rig.run(0.1)

@@ -29,7 +29,7 @@ def edited(path, old, new):
     return path
 
 
-def test_a_key_file_returns_what_was_saved_and_only_its_owner_reads_it(written):
+def test_only_its_owner_reads_a_key_file(written):
     assert load_key(written) == Key("fleet-7", FAKE_SECRET, SCHEME)
     assert os.stat(written).st_mode & 0o777 == 0o600
 
@@ -77,7 +77,7 @@ def test_an_existing_key_file_is_never_overwritten(written):
         ('name = "b"', 'name = "a"', "same name"),
     ],
 )
-def test_a_bad_key_file_is_refused_in_one_sentence_that_says_what_to_change(written, old, new, says):
+def test_a_bad_key_file_says_what_to_change(written, old, new, says):
     with pytest.raises(MtmError, match=says) as refusal:
         load_key(edited(written, old, new))
     assert "\n" not in str(refusal.value)

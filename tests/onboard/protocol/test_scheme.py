@@ -43,7 +43,7 @@ def test_windows_axes_and_positions_follow_from_the_channels():
         scheme.channel("d")
 
 
-def test_channels_that_say_the_same_all_begin_with_the_first_symbol():
+def test_channels_that_say_the_same_begin_with_one_symbol():
     scheme = small_scheme(
         channels=(Channel("a", "a", ("vx",), 3, 0.1), Channel("b", "b", ("vx",), 3, 0.1)), combine="same"
     )

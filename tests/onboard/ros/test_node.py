@@ -59,7 +59,7 @@ def rows(ros: FakeRos) -> np.ndarray:
     return np.array([message.six() for message in ros.published])
 
 
-def test_commands_come_out_with_the_message_and_the_end_is_a_twist_of_zeros(run, parameters):
+def test_commands_come_out_with_the_message_and_end_in_zeros(run, parameters):
     def script(ros):
         yield from commanded(ros, FORWARD, 30)
         end()
@@ -82,7 +82,7 @@ def test_commands_come_out_with_the_message_and_the_end_is_a_twist_of_zeros(run,
     assert record.header.robot == "mtm"
 
 
-def test_the_operator_s_stop_is_a_service_and_holds_whatever_is_commanded(run, parameters):
+def test_the_operator_s_stop_is_a_service_and_holds(run, parameters):
     answers = []
 
     def script(ros):
@@ -101,7 +101,7 @@ def test_the_operator_s_stop_is_a_service_and_holds_whatever_is_commanded(run, p
     assert not rows(ros)[stopped:].any()
 
 
-def test_without_a_message_the_node_passes_commands_on_as_they_are(run, parameters):
+def test_without_a_message_commands_pass_as_they_are(run, parameters):
     def script(ros):
         yield from commanded(ros, FORWARD, 20)
         end()
@@ -127,7 +127,7 @@ def test_a_command_that_comes_no_more_is_stopped_for(run, parameters):
     assert not rows(ros)[-12:].any()
 
 
-def test_when_ros_fails_the_robot_is_told_to_stop_and_it_is_an_error(run, parameters):
+def test_when_ros_fails_the_robot_is_told_to_stop(run, parameters):
     def script(ros):
         yield from commanded(ros, FORWARD, 15)
         raise RuntimeError("the middleware is gone")
@@ -150,7 +150,7 @@ def test_when_ros_fails_the_robot_is_told_to_stop_and_it_is_an_error(run, parame
         ({"message": -1, "text": "hi"}, "plain numbers"),
     ],
 )
-def test_what_does_not_fit_is_told_in_one_sentence_before_anything_is_published(run, parameters, changes, says):
+def test_what_does_not_fit_is_told_before_publishing(run, parameters, changes, says):
     code, ros = run(parameters | changes, lambda ros: iter(()))
     assert code == 1
     assert len(ros.node.errors) == 1

@@ -40,7 +40,7 @@ class Libc:
         return 0
 
 
-def test_what_is_asked_for_is_in_force_in_the_block_and_taken_back_after_it(system):
+def test_what_is_asked_for_is_in_force_within_the_block(system):
     with realtime(RealtimeSettings(priority=40, lock_memory=True, cpu=1), pytest.fail):
         assert system == ["locked", {1}, (os.SCHED_FIFO, 40)]
         system.clear()
@@ -59,7 +59,7 @@ def test_without_the_section_the_system_is_asked_for_nothing(system):
     assert system == []
 
 
-def test_what_the_system_refuses_is_one_warning_with_remedies_and_the_run_goes_on(system, monkeypatch):
+def test_what_the_system_refuses_is_one_warning(system, monkeypatch):
     def refuse(*_):
         raise PermissionError(1, "Operation not permitted")
 

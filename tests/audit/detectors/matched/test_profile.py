@@ -29,7 +29,7 @@ def test_a_file_gives_back_what_was_written(tmp_path_factory, weights):
     assert load_profile(path).weights == pytest.approx(weights / weights.sum(), rel=1e-14, abs=0.0)
 
 
-def test_without_a_profile_every_time_of_returning_is_equally_likely_and_so_are_its_plants():
+def test_without_a_profile_times_of_returning_are_equally_likely():
     prior = np.exp(log_prior(None, COARSE))
     for return_s in (0.1, 0.3, np.inf):
         own = prior[COARSE.returns_s == return_s]
@@ -49,7 +49,7 @@ def test_a_profile_favours_what_is_near_and_rules_nothing_out(plant, family):
     assert abs(group_delays_s[best] - FINE.delays_s[plant] - FINE.lags_s[plant]) < 0.16
 
 
-def test_a_long_recording_shows_the_plant_and_a_wrong_profile_only_delays_it():
+def test_a_wrong_profile_only_delays_what_a_recording_shows():
     run = fleet_run(31, message_ticks=300)
     learnt = estimated(run)
     assert learnt.plants.sum() == pytest.approx(1.0)
@@ -60,7 +60,7 @@ def test_a_long_recording_shows_the_plant_and_a_wrong_profile_only_delays_it():
     assert misled.plants[-1] < 0.5
 
 
-def test_a_profile_makes_a_single_short_window_of_one_robot_surer():
+def test_a_profile_makes_a_single_short_window_surer():
     profile = PlantProfile(estimated(fleet_run(31, message_ticks=300)).plants)
     known, plain = [], []
     for seed in range(41, 51):

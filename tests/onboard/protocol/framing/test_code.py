@@ -32,7 +32,7 @@ def test_parity_follows_the_data_highest_power_first():
     assert encode_symbols([1], SHORT) == [(0, 0, 4, 12, 8)]
 
 
-def test_a_code_symbol_is_dealt_to_channel_symbols_highest_bits_first():
+def test_a_code_symbol_is_dealt_highest_bits_first():
     (symbols,) = encode_symbols([0b00_0000_000000_011011], layout_of(Framing("integer", 18), 64, 3))
     assert symbols == (0, 0, 0b011011)
     (grouped,) = encode_symbols([0b011011_000000_000000_00], GROUPED)

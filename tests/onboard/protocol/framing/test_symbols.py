@@ -19,7 +19,7 @@ def split(alphabet_size, counts):
 
 
 @given(st.integers(2, 65_536), st.lists(st.sampled_from([1, 2, 3, 4, 5]), min_size=1, max_size=5), st.data())
-def test_every_number_that_fits_survives_the_way_through_the_channels(alphabet_size, counts, data):
+def test_every_number_survives_the_way_through_the_channels(alphabet_size, counts, data):
     scheme = split(alphabet_size, counts)
     number = data.draw(st.integers(0, 2 ** payload_bits(scheme) - 1))
     symbols = symbols_of_number(number, scheme)
@@ -30,7 +30,7 @@ def test_every_number_that_fits_survives_the_way_through_the_channels(alphabet_s
     )
 
 
-def test_four_channels_of_two_bits_carry_a_byte_most_significant_first():
+def test_four_channels_of_two_bits_carry_a_byte():
     scheme = split(4, [1, 1, 1, 1])
     assert payload_bits(scheme) == 8
     assert symbols_of_number(0b11_10_01_00, scheme) == (3, 2, 1, 0)
