@@ -114,6 +114,16 @@ def test_a_crash_in_the_middle_of_a_row_costs_that_row(tmp_path):
     assert record.damaged == 1
 
 
+@pytest.mark.parametrize("line", ["# {", "# [1]", '# {"tick": "a", "text": "b"}', "# ", "#", "# 7"])
+def test_a_damaged_comment_is_counted_and_skipped(tmp_path, line):
+    with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
+        write(journal, range(10))
+    journal.path.write_text(journal.path.read_text() + line + "\n")
+    record = read_journal(journal.path)
+    assert (record.header, record.ticks.tolist()) == (HEADER, list(range(10)))
+    assert (record.damaged, record.events) == (1, ())
+
+
 def test_a_writer_that_stands_still_holds_up_no_tick(tmp_path, monkeypatch):
     monkeypatch.setattr("mtm_onboard.journal.journal._MOST_WAITING", 100)
     monkeypatch.setattr("mtm_onboard.journal.journal._WRITE_PERIOD_S", 1e6)
