@@ -266,3 +266,49 @@ def test_a_wrong_channel_and_wrong_symbols_are_refused():
         Modulator(small_codebook(), "b", (1,))
     with pytest.raises(MtmError, match="choose 0 to 3"):
         Modulator(small_codebook(), "a", (4,))
+
+
+def test_silence_is_a_view_that_nobody_can_write_to():
+    modulator = Modulator(small_codebook(), "a", SILENCE)
+    with pytest.raises(ValueError, match="read-only"):
+        modulator.perturbation(5)[0] = 1.0
+
+
+def test_whoever_asks_again_for_the_start_hears_it_again():
+    modulator = Modulator(small_codebook(), "a", (0,))
+    queued = modulator.queue((1,))
+    played(modulator, [0])
+    assert [queued.start_tick(0.0), queued.start_tick(0.0)] == [120, 120]
+
+
+@pytest.mark.parametrize("axes", [("vx", "vy", "wz"), ("wz", "vx"), ("vy",)])
+def test_noise_goes_to_the_axes_that_the_channel_names(axes):
+    modulator = Modulator(small_codebook(channels=(Channel("a", "a", axes, 1, 0.1),)), "a", (1,))
+    added = dict(zip(("vx", "vy", "wz"), np.subtract(modulator.add(9, BASE), BASE), strict=True))
+    noise = dict(zip(axes, modulator.perturbation(9), strict=True))
+    assert added == pytest.approx({axis: 0.1 * noise.get(axis, 0.0) for axis in ("vx", "vy", "wz")})
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+def test_a_message_is_asked_for_the_slot_in_which_it_begins(schedule):
+    asked = []
+
+    class Asked(Counting):
+        def symbols(self, slot):
+            asked.append(slot)
+            return super().symbols(slot)
+
+    modulator = Modulator(small_codebook(schedule=schedule, first_slot=100), "b", Asked())
+    assert asked[0] == 100
+    played(modulator, range(130))
+    asked.clear()
+    modulator.queue(Asked())
+    assert asked == [102]
+
+
+def test_between_windows_of_a_queued_message_the_loop_may_run():
+    with patch("mtm_onboard.runtime.modulator.time.sleep") as sleep:
+        modulator = Modulator(small_codebook(), "b", (3, 0, 2))
+        assert sleep.call_args_list == []
+        modulator.queue((1, 1, 3))
+    assert [call.args for call in sleep.call_args_list] == [(0.001,)] * 3
