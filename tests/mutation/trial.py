@@ -24,6 +24,7 @@ from tests.mutation.targets import Target
 # For a mutant that waits for ever, which takes no processor time.
 _LONGEST_S = 300
 _MOST_BYTES = 4 << 30
+_UNUSED_PLUGINS = ("benchmark", "cacheprovider", "faulthandler", "junitxml", "pastebin", "doctest", "stepwise")
 
 
 class Substitute(importlib.abc.MetaPathFinder, importlib.abc.Loader):
@@ -67,7 +68,9 @@ def _passes(target: Target, source: str, tests: str, longest_cpu_s: float) -> bo
         try:
             _limit(longest_cpu_s)
             sys.meta_path.insert(0, Substitute(target, source))
-            options = ["-x", "-q", "--assert=plain", "-p", "no:cacheprovider", "-p", "no:faulthandler"]
+            # Without the benchmarks' plugin, which asks git about the machine's state each time.
+            options = ["-o", "addopts=", "--import-mode=importlib", "-x", "-q", "--assert=plain"]
+            options += [part for name in _UNUSED_PLUGINS for part in ("-p", f"no:{name}")]
             with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
                 passed = pytest.main([*options, tests]) == 0
         finally:
