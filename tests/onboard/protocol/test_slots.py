@@ -90,3 +90,8 @@ def test_what_is_no_time_is_refused(unix_s):
 def test_a_slot_before_1970_has_no_epoch():
     with pytest.raises(MtmError, match="set the clock"):
         epoch_of_slot(-1, SCHEMES[0])
+
+
+def test_a_microsecond_after_its_start_a_slot_is_still_the_next():
+    scheme = small_scheme(message_ticks=120)
+    assert [next_slot(unix_s, scheme) for unix_s in (0.0, 1e-6, 2e-6)] == [0, 0, 1]

@@ -124,3 +124,23 @@ def test_a_late_tick_has_the_phase_of_its_place_in_the_window():
     bins = tone_bins(100, 50.0, (0.5, 5.0))
     late = 100 * 10**12
     assert np.array_equal(tone_basis(bins, 100, np.array([late + 7])), tone_basis(bins, 100, np.array([7])))
+
+
+def test_a_stream_of_zeros_is_the_loudest_tone_there_is(monkeypatch):
+    monkeypatch.setattr("mtm_onboard.protocol.waveform.stream", lambda *asked: bytes(asked[-1]))
+    amplitudes, phases_rad = draw_tones(bytes(32), 0, 0, 0, 0, 3)
+    # The middle of the first of 2 ** 53 steps.
+    assert amplitudes == pytest.approx([np.sqrt(2.0 * 54.0 * np.log(2.0))] * 3)
+    assert phases_rad.tolist() == [0.0] * 3
+
+
+def test_many_windows_at_once_are_each_window_by_itself():
+    bins = tone_bins(50, 50.0, (2.0, 20.0))
+    drawn = [[draw_tones(bytes(32), 0, 0, symbol, axis, len(bins)) for axis in range(3)] for symbol in range(2)]
+    amplitudes, phases_rad = (np.array([[axis[part] for axis in row] for row in drawn]) for part in (0, 1))
+    together = evaluate_window(phasors(amplitudes, phases_rad, "window"), bins, 50)
+    assert together.shape == (2, 3, 50)
+    for symbol in range(2):
+        for axis in range(3):
+            alone = phasors(amplitudes[symbol, axis], phases_rad[symbol, axis], "window")
+            np.testing.assert_allclose(together[symbol, axis], evaluate_window(alone, bins, 50), atol=1e-12)
