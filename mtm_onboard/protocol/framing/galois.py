@@ -45,7 +45,7 @@ def _generator(parity: int, field_bits: int) -> tuple[int, ...]:
         # Times (x + alpha ** root).
         product = [*generator, 0]
         for place, coefficient in enumerate(generator):
-            product[place + 1] ^= powers[logarithms[coefficient] + root % ((1 << field_bits) - 1)]
+            product[place + 1] ^= powers[logarithms[coefficient] + root]
         generator = product
     return tuple(generator[1:])
 
