@@ -11,8 +11,8 @@ PYTEST :=
 # The build without CUDA where the index offers it under this number.
 TORCH := torch==2.13.0
 
-.PHONY: setup demo site test test-all test-long test-oldest lint peers bench mutants firmware firmware-mutants deb deb-test dist constraints \
-  clean
+.PHONY: setup demo site test test-all test-long test-oldest explore coverage lint peers bench mutants firmware \
+  firmware-mutants deb deb-test dist constraints clean
 
 # $(call install,folder,file): the packages that a file of constraints/ names, by hash, and the project itself.
 install = $(PYTHON) -m venv $(1) && \
@@ -52,6 +52,18 @@ $(OLDEST)/.oldest: pyproject.toml constraints/oldest.txt
 	@$(call install,$(OLDEST),oldest)
 	@touch $@
 
+# Property tests with other examples each time; SEED=... repeats a search.
+SEED := $(or $(SEED),$(shell od -An -N4 -tu4 /dev/urandom | tr -d ' '))
+explore: setup
+	@echo 'to reproduce: make explore SEED=$(SEED)'
+	@MTM_HYPOTHESIS=explore $(BIN)/pytest -m "hypothesis and not peer" --hypothesis-seed=$(SEED) tests \
+	  || { echo 'to reproduce: make explore SEED=$(SEED)'; exit 1; }
+
+# Lines and branches that no test reaches are printed; of what limits the robot and what both ends share there are none.
+coverage: setup
+	$(BIN)/pytest -m "not long and not peer" --cov --cov-report=term $(TESTS)
+	$(BIN)/coverage report --fail-under=100 --include='mtm_onboard/protocol/*,mtm_onboard/runtime/guard.py'
+
 lint: setup
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/ruff check --quiet .
@@ -79,7 +91,7 @@ firmware-mutants: setup
 	$(MAKE) -C firmware_shim mutants
 
 mutants: setup
-	$(BIN)/python -m tests.mutation
+	$(BIN)/python -m tests.mutation $(if $(SECONDS),--seconds $(SECONDS))
 
 bench: setup
 	$(BIN)/pytest tests/benchmarks --benchmark-enable -s

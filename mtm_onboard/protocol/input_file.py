@@ -33,7 +33,7 @@ def opened(path: Path, what: str) -> Iterator[BinaryIO]:
         raise MtmError(f"cannot read {what} {path}: {reason}; check the name") from error
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise MtmError(f"{path} is not a file but a folder, pipe or device; name a file that holds {what}")
+        raise MtmError(f"{path} is not a file but a folder, pipe or device; name {what}")
     with os.fdopen(descriptor, "rb") as file:
         yield file
 

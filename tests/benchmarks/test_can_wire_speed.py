@@ -16,7 +16,7 @@ COMMAND = BodyVelocity(0.1, 0.2, 0.3)
 
 
 @pytest.mark.parametrize("kind", [VirtualRig, LineRig])
-def test_a_command_two_heartbeats_and_a_push_take_well_under_a_millisecond(benchmark, kind):
+def test_a_tick_on_the_wire_takes_well_under_a_millisecond(benchmark, kind):
     with can_rig(kind) as rig, rig.transport:
         if kind is VirtualRig:
             rig.tap.shutdown()

@@ -52,7 +52,7 @@ def test_modulator_and_guard_take_a_few_microseconds_a_tick(benchmark, schedule)
 
 
 @pytest.mark.parametrize("schedule", ["fixed", "rolling"])
-def test_modulator_and_guard_take_20_microseconds_of_the_processor_at_most(capsys, schedule):
+def test_modulator_and_guard_take_20_microseconds_at_most(capsys, schedule):
     tick = modulated_and_guarded(schedule)
     times_ns = np.empty(10_000)
     for number in range(len(times_ns)):

@@ -12,7 +12,7 @@ from mtm_onboard.runtime.modulator import Modulator
 SECRET = b"not a real secret, only for test"
 
 
-def test_robots_move_the_same_with_the_message_from_c_as_from_python():
+def test_robots_move_the_same_by_c_as_by_python():
     key = Key("rig", SECRET, fleet_scheme(200))
     runs = [
         run_lockstep(RunSettings(key=key, symbols=symbols, seconds=5.5, seed=7, wire="direct", modulator=modulator))

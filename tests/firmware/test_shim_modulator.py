@@ -53,7 +53,7 @@ def test_missed_ticks_and_jumps_shift_nothing(schedule):
     assert difference(*both(schedule), ticks) < 1e-5
 
 
-def test_the_second_buffer_carries_a_rolling_message_into_the_next():
+def test_the_second_buffer_carries_a_rolling_message_on():
     _, shim = both("rolling")
     for tick in range(450):
         shim.add(tick, BASE)
@@ -61,7 +61,7 @@ def test_the_second_buffer_carries_a_rolling_message_into_the_next():
     assert shim._shim.tick == 449
 
 
-def test_perturbation_is_in_multiples_of_sigma_in_the_channels_order_of_axes():
+def test_perturbation_is_in_sigmas_in_the_channel_s_axis_order():
     python, shim = both("fixed")
     for tick in range(200):
         np.testing.assert_allclose(shim.perturbation(tick), python.perturbation(tick), atol=1e-4)

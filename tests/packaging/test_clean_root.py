@@ -119,7 +119,7 @@ def test_the_doctor_finds_a_robot_in_order(robot):
     assert found.returncode == ("fail" in checks.values())
 
 
-def test_a_simulated_robot_takes_base_commands_says_two_messages_and_keeps_a_journal(robot):
+def test_a_robot_says_two_messages_and_keeps_a_journal(robot):
     command = robot_command(robot, "run", *files("--stdin", "--message", str(FIRST), "--duration", "3"))
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
         try:
@@ -165,7 +165,7 @@ def check_journal(robot: Path) -> None:
     assert record.noise[calm, :2] == pytest.approx(0.1 * np.array(noise), abs=1e-6)
 
 
-def test_removed_it_leaves_journals_and_purged_it_leaves_no_keys_of_the_system(robot):
+def test_removed_it_leaves_journals_and_purged_no_keys(robot):
     (robot / "etc/mtm/robot1.key").touch(mode=0o600)
     as_root(robot, "dpkg", "--remove", "mtm-onboard")
     assert (robot / "etc/mtm/robot1.key").exists()

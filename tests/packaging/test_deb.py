@@ -30,7 +30,7 @@ def field(built, name):
     return subprocess.run(["dpkg-deb", "-f", built, name], check=True, capture_output=True, text=True).stdout.strip()
 
 
-def test_it_is_for_every_architecture_and_takes_debians_own_libraries(package):
+def test_it_is_for_every_architecture_with_debians_libraries(package):
     built, _ = package
     assert field(built, "Architecture") == "all"
     assert {"python3-numpy", "python3-can", "python3-serial"} <= set(field(built, "Depends").split(", "))

@@ -68,7 +68,7 @@ def test_the_index_would_take_both(built):
     run(sys.executable, "-m", "twine", "check", "--strict", *built)
 
 
-def test_the_wheel_holds_the_packages_their_types_and_the_licence(built):
+def test_the_wheel_holds_packages_types_and_the_licence(built):
     wheel, sdist = built
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())

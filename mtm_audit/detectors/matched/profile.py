@@ -51,9 +51,9 @@ def log_prior(profile: PlantProfile | None, plants: Plants) -> Floats:
 
 
 def profile_text(profile: PlantProfile) -> str:
-    """The profile file's text."""
+    """The profile file's text; weights to their last bit, so that the file gives back what was learnt."""
     rows = [
-        f"    {{delay_s = {delay_s:.4g}, lag_s = {lag_s:.4g}, return_s = {return_s:.4g}, weight = {weight:.6f}}},"
+        f"    {{delay_s = {delay_s:.4g}, lag_s = {lag_s:.4g}, return_s = {return_s:.4g}, weight = {float(weight)!r}}},"
         for delay_s, lag_s, return_s, weight in zip(
             FINE.delays_s, FINE.lags_s, FINE.returns_s, profile.weights, strict=True
         )

@@ -48,7 +48,7 @@ def audit(folder, capsys, monkeypatch):
     return run
 
 
-def test_a_plan_names_the_fastest_scheme_first_and_then_one_line_a_strategy(audit):
+def test_a_plan_names_the_fastest_scheme_first(audit):
     code, out, err = audit("plan", "lander.csv", *JOB)
     assert (code, err) == (0, "")
     lines = out.splitlines()
@@ -151,7 +151,7 @@ def test_a_picture_is_drawn(audit, suffix):
         (("--bits", "10", "--like", "lander.csv"), "can be read by others"),
     ],
 )
-def test_what_cannot_be_planned_is_refused_in_one_sentence_and_nothing_is_written(audit, folder, options, says):
+def test_what_cannot_be_planned_is_refused_with_nothing_written(audit, folder, options, says):
     before = sorted(os.listdir(folder))
     code, out, err = audit("plan", "lander.csv", *options)
     assert (code, out) == (1, "")

@@ -62,7 +62,7 @@ def test_a_run_in_numbers(run):
     assert summary.rms[2] == summary.energy[2] == 0.0
 
 
-def test_the_noise_of_a_journal_is_the_modulator_s_where_no_limit_cut_it(run):
+def test_a_journal_s_noise_is_the_modulator_s_within_limits(run):
     path, _ = run
     record = read_journal(path)
     truth = injected_noise(record, start_s=3.0)
@@ -90,7 +90,7 @@ def test_in_a_missing_tick_the_noise_is_held_and_not_valid(tmp_path):
     assert summary_of(record).as_table()["ticks"] | {"sent": 4, "unsent": 1} == summary_of(record).as_table()["ticks"]
 
 
-def test_in_simulated_time_the_noise_counts_from_the_message_s_start(tmp_path):
+def test_simulated_noise_counts_from_the_message_s_start(tmp_path):
     header = JournalHeader(
         fingerprint="0" * 16,
         key_id="fake-key",
@@ -144,7 +144,7 @@ def test_json_says_the_same_for_programs(run, capsys):
     assert all(math.isfinite(axis["energy"]) for axis in told["noise"].values())
 
 
-def test_a_picture_is_drawn_and_a_wrong_name_is_refused_before_the_reading(run, tmp_path, capsys):
+def test_a_picture_s_wrong_name_is_refused_before_the_reading(run, tmp_path, capsys):
     assert audit(run[0], "--plot", tmp_path / "run.png") == 0
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG\r\n")
     assert audit(tmp_path / "none.csv", "--plot", tmp_path / "run.txt") == 1

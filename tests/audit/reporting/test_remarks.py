@@ -73,14 +73,14 @@ def test_a_robot_out_of_sight_for_long_is_remarked():
     assert warnings == ("robot0 was out of sight for 30% of the time between its first and last sighting",)
 
 
-def test_a_track_too_short_to_read_is_remarked_beside_one_that_was_read():
+def test_a_track_too_short_is_remarked_beside_one_that_is_read():
     warnings, _, decoding = told(track(0), track(1, seconds=3.0))
     assert any("track robot1 is too short to read channel robot1" in warning for warning in warnings)
     assert decoding.symbols[1] is None
 
 
 @pytest.mark.parametrize(("p_value", "sentences"), [(0.5, 1), (0.011, 1), (0.009, 2), (0.0002, 2)])
-def test_a_message_that_is_nearly_found_is_not_passed_off_as_absent(p_value, sentences):
+def test_a_message_nearly_found_is_not_called_absent(p_value, sentences):
     _, _, decoding = told(robot_track(KEY, "robot0", None, 20.0), decoys=20)
     near = replace(decoding, verdict="absent", evidence=replace(decoding.evidence, p_value=p_value))
     said = advice(Recording((Path("recording.tum"),), "motion capture", (track(),)), near)

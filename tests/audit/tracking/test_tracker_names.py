@@ -76,7 +76,7 @@ def test_a_message_in_an_arms_joint_is_decoded_from_the_video(audit, tmp_path):
     assert (code, out.splitlines()[0]) == (0, f"decoded: message {SYMBOL} (0b10)")
 
 
-def test_an_arm_without_a_message_and_one_away_for_a_while_say_nothing_wrong(audit, tmp_path):
+def test_a_silent_or_absent_arm_says_nothing_wrong(audit, tmp_path):
     write_video(swinging(None), tmp_path / "silent.mp4", 50)
     assert audit(tmp_path / "silent.mp4", "--tracker", "arms")[0] == 3
     write_video(swinging(SYMBOL, hidden=range(100, 160)), tmp_path / "away.mp4", 50)

@@ -9,9 +9,7 @@ from hil.vehicles.motion_controller import DEADMAN_S
 from mtm_onboard.links.factory import make_link
 from mtm_onboard.model.velocity import BodyVelocity
 from tests.hil.vehicles.floating_plant import FloatingPlant
-
-# The kernel passes bytes along a pseudo-terminal in its own time.
-PATIENCE_S = 5.0
+from tests.patience import PATIENCE_S
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ def first_picture(camera, scene, trajectories, seed=1):
 @pytest.mark.parametrize(
     "optics", [overhead(), OBLIQUE, Optics(position_m=(2, 1, 3), target_m=(0, 0, 0), focal_px=600, mirrored=True)]
 )
-def test_a_point_of_a_plane_is_seen_by_the_pixel_that_it_projects_to(optics):
+def test_a_point_of_a_plane_is_seen_by_its_own_pixel(optics):
     plane = optics.plane_xy_m(0.2)
     for row, column in ((100, 120), (240, 320), (400, 500)):
         point = np.append(plane[row, column], 0.2)[None]
@@ -113,7 +113,7 @@ def test_a_long_exposure_smears_what_moves():
     assert contrast[1] < 0.9 * contrast[0]
 
 
-def test_noise_has_the_stated_strength_and_another_place_in_every_frame():
+def test_noise_has_the_stated_strength_and_differs_by_frame():
     frames = film(Camera(noise_levels=3.0), Scene(), [still()], np.random.default_rng(1))
     first, second = next(frames).image.astype(float), next(frames).image.astype(float)
     assert (first - second).std() == pytest.approx(3.0 * np.sqrt(2), rel=0.1)
@@ -126,7 +126,7 @@ def test_the_same_seed_films_the_same_recording():
     assert all(np.array_equal(a.image, b.image) for a, b in zip(one, same, strict=True))
 
 
-def test_frames_jitter_around_their_period_and_drop_at_the_stated_rate():
+def test_frames_jitter_and_drop_at_the_stated_rate():
     regular = frame_times(Camera(), 10.0, np.random.default_rng(1))
     assert regular == pytest.approx(np.arange(301) / 30)
     irregular = frame_times(Camera(jitter_s=0.005, drop_probability=0.2), 100.0, np.random.default_rng(1))

@@ -82,7 +82,7 @@ def test_a_copter_goes_to_the_right_and_a_rover_only_faster(name):
 
 
 @pytest.mark.parametrize("name", ["copter", "px4"])
-def test_a_velocity_in_the_local_frame_is_towards_north_and_east_whatever_the_heading(name):
+def test_a_local_velocity_is_towards_north_and_east(name):
     companion = Companion(name, is_guided=True, is_armed=True)
     for _ in range(50):
         companion.setpoint(yaw_rate=-1.0)
@@ -111,7 +111,7 @@ def test_what_a_real_one_ignores_is_ignored_and_counted(ready, change):
 
 
 @pytest.mark.parametrize("name", ["copter", "px4"])
-def test_a_velocity_without_a_yaw_rate_is_obeyed_and_turns_nothing(name):
+def test_a_velocity_without_a_yaw_rate_turns_nothing(name):
     companion = Companion(name, is_guided=True, is_armed=True)
     assert companion.setpoint(vx=0.5, vy=0.25, yaw_rate=math.nan, mask=0x0DC7) == BodyVelocity(0.5, -0.25, 0.0)
 
@@ -125,12 +125,12 @@ def test_a_rover_that_is_told_a_velocity_alone_steers_towards_it(mask):
     assert companion.setpoint(vx=0.5, mask=mask) == BodyVelocity(0.5, 0.0, 0.0)
 
 
-def test_the_force_bit_counts_for_ardupilot_only_with_accelerations():
+def test_ardupilot_s_force_bit_counts_with_accelerations_only():
     assert Companion("copter", is_guided=True, is_armed=True).setpoint(vx=0.5, mask=0x0FC7).vx_mps == 0.5
     assert Companion("px4", is_guided=True, is_armed=True).setpoint(vx=0.5, mask=0x0FC7) == STOP
 
 
-def test_arming_and_modes_are_obeyed_with_what_is_no_number_behind_them():
+def test_arming_and_modes_are_obeyed_with_nan_behind_them():
     companion = Companion("rover")
     assert companion.ask(SET_MODE, 1.0, 15.0, *[math.nan] * 5) == [ACCEPTED]
     assert companion.ask(ARM, 1.0, *[math.nan] * 6) == [ACCEPTED]
@@ -176,7 +176,7 @@ def test_set_points_move_nothing_outside_the_mode_or_disarmed(name, state):
 
 
 @pytest.mark.parametrize(("name", "seconds"), [("copter", 3.0), ("rover", 3.0), ("px4", 1.0)])
-def test_a_vehicle_stops_when_set_points_cease_and_px4_leaves_offboard(name, seconds):
+def test_a_vehicle_stops_when_set_points_cease(name, seconds):
     companion = Companion(name, is_guided=True, is_armed=True)
     companion.setpoint(vx=0.5)
     companion.run(seconds - 0.05)
@@ -217,7 +217,7 @@ def test_a_stream_that_has_ended_is_not_enough():
 
 
 @pytest.mark.parametrize(("name", "number"), [("copter", 4.0), ("rover", 15.0)])
-def test_ardupilot_changes_modes_when_asked_and_arms_when_its_checks_pass(name, number):
+def test_ardupilot_changes_modes_and_arms_when_its_checks_pass(name, number):
     companion = Companion(name)
     assert companion.ask(SET_MODE, 1.0, number) == [ACCEPTED]
     assert companion.ask(ARM, 1.0) == [ACCEPTED]
@@ -251,7 +251,7 @@ def test_requests_that_make_no_sense_change_nothing(request_, answer):
     assert companion.ask(*request_, system=9) == []
 
 
-def test_it_says_what_it_is_once_a_second_and_how_it_moves_ten_times():
+def test_it_says_what_it_is_each_second_and_moves_ten_times():
     companion = Companion("rover", is_guided=True)
     companion.run(5.0)
     heard = companion.heard()

@@ -25,7 +25,7 @@ def test_a_world_s_axes_are_those_of_its_channels(name):
     assert (world.name, world.rate_hz) == (name, SIGNALS[name].rate_hz)
 
 
-def test_a_world_that_does_not_exist_is_refused_with_those_that_do():
+def test_a_world_that_does_not_exist_is_refused():
     with pytest.raises(MtmError, match="no world 'moon'; choose one of: discovery, lunar-lander, reacher, football"):
         make_world("moon")
 

@@ -48,7 +48,7 @@ def test_the_image_holds_the_channels_part_of_the_message(key_path, capsys):
 
 
 @pytest.mark.parametrize("key_path", [("fixed", 1)], indirect=True)
-def test_one_channel_needs_no_name_and_a_fixed_message_repeats_unless_told_not_to(key_path):
+def test_one_channel_needs_no_name_and_a_fixed_message_repeats(key_path):
     assert parse_image(export(key_path, "--message", "5")[1].read_bytes()).repeats
     assert not parse_image(export(key_path, "--message", "5", "--no-repeat")[1].read_bytes()).repeats
 
@@ -96,7 +96,7 @@ def test_a_framed_message_is_written_as_each_slot_and_day_has_it(tmp_path):
         (["--message", "1", "--channel", "robot0", "--limit-mps", "0"], "limit"),
     ],
 )
-def test_bad_input_is_one_sentence_and_leaves_an_older_image_alone(key_path, options, words, capsys):
+def test_bad_input_leaves_an_older_image_alone(key_path, options, words, capsys):
     (key_path.parent / "image.bin").write_bytes(b"older")
     code, out = export(key_path, *options)
     error = capsys.readouterr().err

@@ -74,7 +74,7 @@ def test_an_integer_s_size_is_in_bits(tmp_path):
         (("--pooling", "guess"), 1, "pooling"),
     ],
 )
-def test_a_framing_that_cannot_be_is_refused_and_no_key_is_written(tmp_path, capsys, options, code, says):
+def test_a_framing_that_cannot_be_writes_no_key(tmp_path, capsys, options, code, says):
     try:
         ended = keygen(tmp_path, "--preset", "robomaster-fleet", *options)
     except SystemExit as leaving:
@@ -196,7 +196,7 @@ def test_status_and_stop_ask_the_socket_that_is_named(tmp_path, robot, capsys):
     assert robot == [{"command": "status"}, {"command": "stop"}]
 
 
-def test_a_robot_that_does_not_run_or_has_no_socket_gets_one_sentence(tmp_path, config, capsys):
+def test_a_robot_that_does_not_run_gets_one_sentence(tmp_path, config, capsys):
     assert main(["stop", "--config", str(config)]) == 1
     assert "no running robot answers" in capsys.readouterr().err
     config.write_text(CONFIG)

@@ -64,7 +64,7 @@ def key_of(**changes) -> Key:
     return Key("fake-key", FAKE_SECRET, small_scheme(**({"schedule": "rolling"} | changes)))
 
 
-def test_a_new_message_is_answered_with_the_boundary_it_begins_at():
+def test_a_new_message_is_answered_with_its_boundary():
     robot = Robot(key_of(), 7)
     robot.modulator.now = 130
     answer = robot.send(number=9)
@@ -79,7 +79,7 @@ def test_under_the_fixed_schedule_there_is_no_slot_to_name():
     assert Robot(key_of(schedule="fixed"), 7).send(number=9)["slot"] is None
 
 
-def test_messages_are_numbered_and_one_that_waited_in_vain_is_named():
+def test_messages_are_numbered_and_a_replaced_one_is_named():
     robot = Robot(key_of(framing=Framing("integer", 4, number_bits=2)), 7)
     answers = [robot.send(number=number) for number in (1, 2)]
     robot.modulator.now = 240
@@ -90,7 +90,7 @@ def test_messages_are_numbered_and_one_that_waited_in_vain_is_named():
     assert (robot.modulator.message.number, robot.modulator.message.payload) == (2, 2)
 
 
-def test_a_message_that_does_not_fit_is_refused_and_takes_no_number():
+def test_a_message_that_does_not_fit_takes_no_number():
     robot = Robot(key_of(), 7)
     for content, sentence in (
         ({"number": 999}, "does not fit"),
@@ -103,7 +103,7 @@ def test_a_message_that_does_not_fit_is_refused_and_takes_no_number():
     assert robot.send(number=1)["number"] == 1
 
 
-def test_a_loop_that_stands_still_takes_up_nothing_and_the_client_hears_so(monkeypatch):
+def test_a_loop_that_stands_still_takes_up_nothing(monkeypatch):
     monkeypatch.setattr("mtm_onboard.control.control._PATIENCE_S", 0.01)
     robot = Robot(key_of(), 7)
     robot.modulator.prepare = lambda tick: None
@@ -115,7 +115,7 @@ def test_a_loop_that_stands_still_takes_up_nothing_and_the_client_hears_so(monke
 
 
 @pytest.mark.parametrize(("schedule", "slot"), [("rolling", FIRST_SLOT + 2), ("fixed", None)])
-def test_a_robot_that_began_in_silence_gets_its_first_message_at_the_next_boundary(schedule, slot):
+def test_a_silent_robot_speaks_from_the_next_boundary(schedule, slot):
     robot = Robot(key_of(schedule=schedule))
     robot.modulator.now = 130
     assert status(robot) == ("silence", None, True)

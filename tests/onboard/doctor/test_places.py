@@ -71,7 +71,7 @@ def test_a_control_socket_of_another_run_is_a_failure_and_stays(tmp_path):
         assert path.exists()
 
 
-def test_a_control_socket_in_no_folder_is_a_failure_unless_the_service_makes_it(tmp_path):
+def test_a_control_socket_in_no_folder_is_a_failure(tmp_path):
     assert check_control(ControlSettings(str(tmp_path / "nowhere" / "r.sock"))).status == "fail"
     assert not Path("/run/mtm-of-no-test").exists()
     assert check_control(ControlSettings("/run/mtm-of-no-test/r.sock")).status == "warn"

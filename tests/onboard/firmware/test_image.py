@@ -83,7 +83,7 @@ def noise_of(image, row, axis):
     return image.samples[row].astype(float) * unit, unit
 
 
-def test_samples_use_the_whole_range_and_follow_the_order_of_axes():
+def test_samples_use_the_whole_range_in_the_order_of_axes():
     book = codebook()
     noise = 0.1 * np.concatenate([book.samples(book.scheme.channels[0], 0, [s])[0] for s in (1, 2)], axis=1)
     straight = an_image()

@@ -165,7 +165,7 @@ class LinkConformance:
         rig.settle()
         assert rig.plant.position_xy_m == (0.0, 0.0)
 
-    def test_opening_again_after_a_stop_drives_again_but_does_not_resume(self, rig):
+    def test_opening_after_a_stop_drives_again_but_does_not_resume(self, rig):
         with rig.transport:
             rig.drive(BodyVelocity(0.5, 0.0, 0.0))
             rig.transport.stop()
@@ -189,7 +189,7 @@ class LinkConformance:
         assert rig.plant.velocity_body == STOP
         assert rig.is_released()
 
-    def test_a_deadman_at_the_far_end_outlives_the_commands_and_not_the_link(self, rig):
+    def test_a_far_deadman_outlives_the_commands_and_not_the_link(self, rig):
         rig.controller.deadman_s = 0.2
         with rig.transport:
             rig.drive(self.askew)
@@ -234,7 +234,7 @@ class LinkConformance:
         assert rig.plant.velocity_body == STOP
         assert rig.is_released()
 
-    def test_a_clogged_wire_holds_no_command_up_for_longer_than_the_write_bound(self, rig):
+    def test_a_clogged_wire_holds_a_command_no_longer_than_the_bound(self, rig):
         rig.needs("clog")
         durations_s = []
         rig.transport.open()
@@ -247,7 +247,7 @@ class LinkConformance:
         # A busy host may hold up single ones.
         assert median(durations_s) <= rig.transport.write_bound_s + 0.01
 
-    def test_a_link_that_comes_back_moves_the_robot_only_for_a_command_from_after_that(self, rig):
+    def test_a_link_that_is_back_obeys_only_commands_from_after(self, rig):
         rig.needs("cut", "mend", "remake")
         rig.controller.deadman_s = 0.2
         link = ReconnectingLink(rig.remake, rig.clock)

@@ -18,9 +18,7 @@ from mtm_onboard.links.robomaster_uart import RoboMasterUart
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import MtmError
 from tests.hil.vehicles.floating_plant import FloatingPlant
-
-# The kernel passes bytes along in its own time, which the simulated clock waits for, briefly.
-PATIENCE_S = 5.0
+from tests.patience import PATIENCE_S
 
 
 class OverSocket(RoboMasterPlaintext):

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from mtm_onboard.links.base import LinkBusyError
 from mtm_onboard.links.byte_stream import ByteStream, serial_stream, tcp_stream
 from mtm_onboard.protocol import MtmError
-
-# What a busy machine may add to a wait.
-STALL_S = 0.25
+from tests.onboard.links.stalled_line import StalledLine
+from tests.patience import PATIENCE_S
 
 
 @pytest.fixture
@@ -55,13 +54,13 @@ def test_a_message_arrives_whole_and_is_counted(ends):
     assert link.sent_bytes == 8
 
 
-def test_a_blocked_line_is_one_sentence_within_the_bound(ends):
+def test_a_blocked_line_is_one_sentence_within_the_bound(ends, monkeypatch):
     link, _ = ends
     filled(link)
-    began_s = time.monotonic()
+    line = StalledLine().install(monkeypatch)
     with pytest.raises(MtmError, match="took no command in time"):
         link.write(b"late;", 0.005)
-    assert 0.005 <= time.monotonic() - began_s < 0.005 + STALL_S
+    assert line.waited_s == 0.005
 
 
 def test_a_message_that_could_not_begin_to_leave_is_forgotten(ends):
@@ -81,7 +80,7 @@ def test_a_message_that_could_not_begin_to_leave_is_forgotten(ends):
 
 
 @given(st.lists(st.tuples(st.integers(1, 3000), st.integers(0, 4000)), min_size=1, max_size=40))
-def test_whatever_the_line_takes_at_a_time_no_message_follows_half_of_another(steps):
+def test_no_message_follows_half_of_another(steps):
     ours, theirs = socket.socketpair()
     with ours, theirs:
         ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
@@ -115,7 +114,7 @@ def test_whatever_the_line_takes_at_a_time_no_message_follows_half_of_another(st
         assert set(whole) == written
 
 
-def test_a_silent_line_reads_as_nothing_and_a_closed_one_says_so_after_the_last_words(ends):
+def test_a_silent_line_reads_as_nothing_and_a_closed_one_says_so(ends):
     link, far = ends
     assert link.read() == b""
     far.send(b"bye;")
@@ -149,7 +148,7 @@ def test_a_serial_line_carries_every_byte_both_ways_unchanged():
         every = bytes(range(256))
         link.write(every, 0.1)
         far.write(every, 0.1)
-        deadline_s, there, here = time.monotonic() + 5.0, b"", b""
+        deadline_s, there, here = time.monotonic() + PATIENCE_S, b"", b""
         while len(there + here) < 512 and time.monotonic() < deadline_s:
             there += far.read()
             here += link.read()
@@ -172,7 +171,7 @@ def test_a_robot_that_nobody_reaches_is_one_sentence(port):
         tcp_stream("127.0.0.1", port)
 
 
-def test_closing_a_connection_with_unread_answers_does_not_recall_the_last_command():
+def test_closing_does_not_recall_the_last_command():
     with socket.create_server(("127.0.0.1", 0)) as server:
         link = tcp_stream(*server.getsockname())
         far, _ = server.accept()

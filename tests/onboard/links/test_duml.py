@@ -109,7 +109,7 @@ def test_a_message_that_ends_early_costs_only_itself(message, data):
     assert Parser().feed(whole[:kept] + encode(NEXT)) == [NEXT]
 
 
-def test_a_header_that_is_sound_by_accident_does_not_hold_up_the_message_inside_its_claim():
+def test_a_header_sound_by_accident_hides_no_message():
     parser = Parser()
     accident = encode(Message(sender=0, receiver=0, sequence=0, attributes=0, cmdset=0, cmdid=0, payload=bytes(900)))[
         :4
@@ -131,7 +131,7 @@ def test_the_parser_never_keeps_a_whole_longest_message(portions):
     assert 4 + fed - parser.dropped_bytes < MAX_LENGTH
 
 
-def test_an_aligned_message_fills_frames_of_eight_bytes_and_a_short_last_one():
+def test_an_aligned_message_fills_frames_of_eight_bytes():
     message = golden_message(next(f for f in GOLDEN if f["name"] == "CAN speed(0.5,0,0) c9->c3 noack seq2"))
     frames = ["551904e4c9c30200", "003f210000003f00", "00000000000000a2", "1f"]
     assert [frame.hex() for frame in segment(encode(message))] == frames

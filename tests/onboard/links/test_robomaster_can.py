@@ -76,7 +76,7 @@ def commands(frames):
 RELEASE = [(0x3F, 0x21, bytes(12)), (0x3F, 0x19, b"\x00")]
 
 
-def test_opening_subscribes_engages_and_stands_still_in_that_order():
+def test_opening_subscribes_engages_and_stands_still():
     with can_rig() as rig:
         rig.transport.open()
         assert [command[:2] for command in commands(rig.sent()) if command[1] != 0x60] == [
@@ -88,7 +88,7 @@ def test_opening_subscribes_engages_and_stands_still_in_that_order():
         ]
 
 
-def test_every_message_starts_a_frame_of_its_own_on_the_controllers_id():
+def test_every_message_starts_a_frame_of_its_own():
     with can_rig() as rig, rig.transport:
         rig.transport.send(FORWARD)
         rig.run(0.1)
@@ -97,7 +97,7 @@ def test_every_message_starts_a_frame_of_its_own_on_the_controllers_id():
         assert all(frame.arbitration_id == 0x201 and not frame.is_extended_id for frame in rig.sent())
 
 
-def test_a_heartbeat_goes_out_each_ten_milliseconds_with_its_own_number():
+def test_a_heartbeat_goes_out_each_ten_milliseconds():
     with can_rig() as rig, rig.transport:
         rig.run(1.0)
         messages = Parser().feed(b"".join(bytes(frame.data) for frame in rig.sent()))
@@ -108,7 +108,7 @@ def test_a_heartbeat_goes_out_each_ten_milliseconds_with_its_own_number():
         assert rig.node.heartbeats >= 99
 
 
-def test_missed_heartbeats_are_skipped_and_counted_and_the_schedule_stays():
+def test_missed_heartbeats_are_skipped_and_counted():
     transport = RoboMasterCan(BrokenBus(()))
     transport.open()
     for now_s in (5.0, 5.004, 5.057, 5.059, 5.061):
@@ -116,7 +116,7 @@ def test_missed_heartbeats_are_skipped_and_counted_and_the_schedule_stays():
     assert (transport.heartbeats, transport.missed_heartbeats) == (3, 4)
 
 
-def test_a_service_that_wakes_now_later_now_less_late_misses_no_heartbeat():
+def test_a_service_of_uneven_lateness_misses_no_heartbeat():
     transport = RoboMasterCan(BrokenBus(()))
     transport.open()
     lates_s = [0.002, 0.0001, 0.001, 0.0, 0.0015]
@@ -176,7 +176,7 @@ def test_stop_tries_again_until_both_commands_are_out():
     assert transport.bus_errors == 3
 
 
-def test_a_stop_that_cannot_be_sent_says_so_after_a_few_tries_and_the_bus_is_still_released():
+def test_a_stop_that_cannot_be_sent_still_releases_the_bus():
     bus = BrokenBus(range(OPENING_FRAMES + 1, 10_000))
     with pytest.raises(MtmError, match="switch the robot off"), RoboMasterCan(bus):
         pass
@@ -184,7 +184,7 @@ def test_a_stop_that_cannot_be_sent_says_so_after_a_few_tries_and_the_bus_is_sti
     assert bus.is_shut_down
 
 
-def test_an_opening_that_fails_half_way_releases_the_motors_and_the_bus():
+def test_an_opening_that_fails_half_way_releases_the_bus():
     bus = BrokenBus({OPENING_FRAMES})
     with pytest.raises(MtmError, match="refused a frame"):
         RoboMasterCan(bus).open()
@@ -192,7 +192,7 @@ def test_an_opening_that_fails_half_way_releases_the_motors_and_the_bus():
     assert bus.is_shut_down
 
 
-def test_a_bus_error_in_a_heartbeat_is_counted_and_does_not_end_the_service():
+def test_a_bus_error_in_a_heartbeat_does_not_end_the_service():
     bus = BrokenBus({OPENING_FRAMES + 1})
     transport = RoboMasterCan(bus)
     transport.open()
@@ -220,7 +220,7 @@ class SlowBus(BrokenBus):
 
 
 @pytest.mark.parametrize("full", [True, False])
-def test_a_slow_bus_holds_a_command_up_for_no_longer_than_the_write_bound(monkeypatch, full):
+def test_a_slow_bus_holds_a_command_no_longer_than_the_bound(monkeypatch, full):
     bus = SlowBus(full=full)
     monkeypatch.setattr("mtm_onboard.links.can_stream.time.monotonic", lambda: bus.now_s)
     transport = RoboMasterCan(bus)
@@ -255,7 +255,7 @@ def test_a_full_transmit_queue_is_a_busy_bus_and_no_broken_one():
     transport.send(FORWARD)
 
 
-def test_a_serial_adapter_is_never_waited_for_until_it_has_drained(monkeypatch):
+def test_a_serial_adapter_is_never_waited_for(monkeypatch):
     port = SlcanPort()
     node = CanMotionController(MotionController(FloatingPlant()), port)
     clock = AnsweringClock(SimulatedClock(), node.poll)
@@ -269,7 +269,7 @@ def test_a_serial_adapter_is_never_waited_for_until_it_has_drained(monkeypatch):
     port.shutdown()
 
 
-def test_the_port_of_an_adapter_that_takes_no_farewell_is_released():
+def test_an_adapter_that_takes_no_farewell_is_released():
     class Gone(BrokenBus):
         def shutdown(self):
             raise can.CanOperationError("Could not write to serial device")
@@ -281,7 +281,7 @@ def test_the_port_of_an_adapter_that_takes_no_farewell_is_released():
     assert closed == [True]
 
 
-def test_a_command_does_not_wait_longer_for_a_heartbeat_that_is_stuck():
+def test_a_command_does_not_wait_for_a_stuck_heartbeat():
     transport = RoboMasterCan(BrokenBus(()))
     transport.open()
     with vars(transport)["_lock"], pytest.raises(LinkBusyError, match="still busy"):
@@ -318,7 +318,7 @@ def test_a_link_needs_either_a_bus_or_its_options(arguments):
         RoboMasterCan(**arguments)
 
 
-def test_commands_and_heartbeats_from_two_threads_never_mix_their_frames(monkeypatch):
+def test_two_threads_never_mix_their_frames(monkeypatch):
     monkeypatch.setattr("mtm_onboard.links.robomaster_presence.LOST_S", math.inf)  # the robot stands still in time
     with can_rig() as rig, rig.transport:
         rig.transport.write_bound_s = 10.0  # a beating thread that never pauses leaves the lock to chance
@@ -346,7 +346,7 @@ def test_an_answer_with_an_error_code_is_counted(code, refusals):
         assert rig.transport.refusals == refusals
 
 
-def test_a_robot_that_hears_nothing_more_is_stopped_by_its_own_deadman():
+def test_a_robot_that_hears_nothing_is_stopped_by_its_deadman():
     with can_rig(deadman_s=0.2) as rig, rig.transport:
         rig.transport.send(FORWARD)
         rig.run(0.1)

@@ -48,7 +48,7 @@ def driven(env, action, steps) -> None:
             env.reset()
 
 
-def test_the_message_is_added_to_the_actions_and_goes_on_over_the_episodes():
+def test_the_message_goes_on_over_the_episodes():
     env = add_to_actions(Point(), keyed())
     driven(env, [0.3, -0.2], 230)
     assert isinstance(env, gymnasium.ActionWrapper)
@@ -56,7 +56,7 @@ def test_the_message_is_added_to_the_actions_and_goes_on_over_the_episodes():
     assert (env.bounds.actions, env.bounds.clipped) == (230, 0)
 
 
-def test_what_the_action_space_cuts_is_counted_and_reported_through_outer_wrappers():
+def test_what_the_action_space_cuts_is_counted_and_reported():
     env = gymnasium.wrappers.TimeLimit(add_to_actions(Point(0.35), keyed()), 1000)
     driven(env, [0.3, 0.0], 230)
     wanted = np.array([0.3, 0.0]) + played(230)

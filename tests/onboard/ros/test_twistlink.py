@@ -104,7 +104,7 @@ def test_a_stale_twist_loses_its_noise_first_and_then_its_motion():
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", range(3))
-def test_a_twist_that_is_not_finite_is_refused_and_the_last_good_one_ages(bad, place):
+def test_a_twist_that_is_not_finite_is_refused(bad, place):
     bench = Bench()
     bench.run(0.2, twist(0.3, 0.0, 0.2))
     values = [0.3, 0.0, 0.2]

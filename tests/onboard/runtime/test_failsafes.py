@@ -32,7 +32,7 @@ def reached(rig, from_s=0.0, to_s=math.inf) -> list[BodyVelocity]:
 
 
 @pytest.mark.parametrize("stale", [Staleness(), Staleness(0.3, 0.9), Staleness(0.02, 0.05)])
-def test_a_controller_that_falls_silent_stops_the_noise_first_and_then_the_robot(stale):
+def test_a_silent_controller_stops_noise_first_and_then_robot(stale):
     with can_rig(LineRig) as rig, rig.transport:
         driven = Driven(rig.transport, rig.clock, MESSAGE, staleness=stale)
         driven.run(0.5, BASE)
@@ -50,7 +50,7 @@ def test_a_controller_that_falls_silent_stops_the_noise_first_and_then_the_robot
     assert set(reached(rig, stopped_s)) == {STOP}
 
 
-def test_the_operator_s_stop_is_at_the_plant_within_a_tick_and_nothing_undoes_it():
+def test_the_operator_s_stop_arrives_within_a_tick_and_stays():
     with can_rig(LineRig) as rig, rig.transport:
         driven = Driven(rig.transport, rig.clock, MESSAGE, Limits(1.0, 2.0, acceleration_mps2=0.5))
         driven.run(1.0, BASE)
@@ -105,7 +105,7 @@ def test_what_is_cut_by_a_limit_is_counted(base, limits):
         assert 10 <= driven.guard.clamped <= driven.stats.sent
 
 
-def test_a_process_that_stalls_for_seconds_misses_those_ticks_and_obeys_no_command_from_before():
+def test_a_process_that_stalls_obeys_no_command_from_before():
     with can_rig(LineRig) as rig, rig.transport:
         source = UdpSource(0)
         client = BaseCommandClient(source.port)

@@ -41,7 +41,7 @@ class Libc:
         return 0
 
 
-def test_what_is_asked_for_is_in_force_in_the_block_and_taken_back_after_it(system):
+def test_what_is_asked_for_is_in_force_within_the_block(system):
     with realtime(RealtimeSettings(priority=40, lock_memory=True, cpu=1), pytest.fail):
         assert system == ["locked", {1}, (os.SCHED_FIFO, 40)]
         system.clear()
@@ -91,7 +91,7 @@ def test_the_lowest_priority_is_everybody_s(system):
     thread.join()
 
 
-def test_where_nothing_is_asked_for_or_granted_no_thread_is_placed(system, monkeypatch):
+def test_no_thread_is_placed_where_nothing_is_asked_or_granted(system, monkeypatch):
     with realtime(RealtimeSettings(cpu=1), pytest.fail) as place_threads:
         place_threads(None)
     assert system == [{1}, {0, 1, 2}]
@@ -116,7 +116,7 @@ def test_without_the_section_the_system_is_asked_for_nothing(system):
     assert system == []
 
 
-def test_what_the_system_refuses_is_one_warning_with_remedies_and_the_run_goes_on(system, monkeypatch):
+def test_what_the_system_refuses_is_one_warning(system, monkeypatch):
     monkeypatch.setattr(os, "sched_setscheduler", refused)
     monkeypatch.setattr("ctypes.CDLL", lambda *_, **__: Libc(system, answer=-1))
     warnings = []

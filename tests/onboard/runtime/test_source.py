@@ -59,7 +59,7 @@ def test_a_held_source_gives_what_was_set_last():
     assert source.poll(3.0) == Command(FIRST, 3.0, True)
 
 
-def test_of_the_lines_that_came_the_newest_counts_and_half_a_line_waits(piped):
+def test_the_newest_line_counts_and_half_a_line_waits(piped):
     source, end = piped
     end.write(b"v 0.3 0 -0.5\r\nv -0.1 0.")
     assert source.poll(0.02) == Command(FIRST, 0.02, False)

@@ -85,7 +85,7 @@ def test_without_a_modulator_the_base_commands_go_out_alone():
     assert drive(None, range(20)) == [BASE] * 20
 
 
-def test_a_controller_that_falls_silent_loses_the_noise_at_a_tenth_and_the_motion_at_a_quarter_second():
+def test_a_silent_controller_loses_noise_and_then_motion():
     sent = drive(message(), range(40), last_command_s=0.2)
     assert all(command != BASE for command in sent[:15])
     assert sent[15] == pytest.approx(BASE)  # 0.10 s after the last command
@@ -109,7 +109,7 @@ def test_a_link_that_fails_stops_the_robot_and_the_run():
     assert (link.stops, runtime.link_losses) == (1, 1)
 
 
-def test_the_command_that_broke_the_link_is_in_the_journal_as_unsent(tmp_path):
+def test_the_command_that_broke_the_link_is_journaled_unsent(tmp_path):
     stats, clock = LoopStats(), SimulatedClock()
     with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
         runtime = Runtime(message(), plain_guard(), HeldSource(), Listener(failing_from=3), journal)
@@ -180,7 +180,7 @@ def test_the_journal_tells_what_was_sent_and_why(tmp_path):
     assert set(record.flags[40:]) == {STOPPED}
 
 
-def test_a_loop_on_simulated_time_that_loses_ticks_sends_the_same_commands_at_the_ticks_it_keeps():
+def test_a_loop_that_loses_ticks_sends_the_same_at_the_others():
     every = drive(message(), range(500))
     source, link, clock = HeldSource(), Listener(), SimulatedClock()
     runtime = Runtime(message(), plain_guard(), source, link)

@@ -25,7 +25,7 @@ def quick_table(tmp_path_factory):
     return table_of(out), cells
 
 
-def test_a_quick_look_at_the_lander_reads_the_headline_s_messages(quick_table):
+def test_a_quick_look_at_the_lander_reads_the_headline(quick_table):
     table, _ = quick_table
     for detector in ("coherency", "matched"):
         (row,) = [
@@ -70,7 +70,7 @@ def test_a_renderer_that_does_not_exist_is_refused(capsys):
     assert "'crayon' is not one of" in capsys.readouterr().err
 
 
-def test_all_rollouts_of_the_headline_and_a_part_of_the_others_are_asked_for():
+def test_all_rollouts_of_the_headline_are_asked_for():
     conditions = conditions_of("reacher", Effort(50, 50, 5, 0))
     counts = {condition.point: condition.rollouts for condition in conditions if condition.arm != NO_MESSAGE}
     assert counts[headline_point("reacher", 60)] == 50
@@ -124,5 +124,5 @@ def test_a_longer_message_read_badly_ends_the_search():
     assert shortest_ticks(rows, "matched") == 240
 
 
-def test_a_detector_that_never_reads_as_well_has_no_shortest_message():
+def test_a_detector_that_never_reads_as_well_has_no_shortest():
     assert shortest_ticks([row_of(240, "coherency", 399), row_of(240, "matched", 300)], "matched") is None
