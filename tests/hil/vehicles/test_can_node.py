@@ -268,7 +268,9 @@ def test_a_node_that_is_reset_has_no_streams(node, bus):
 def test_a_robot_that_cannot_engage_says_so_and_stands_still(bus):
     node = CanMotionController(MotionController(FloatingPlant()), bus, can_engage=False)
     tell(node, bus, ENGAGE, FORWARD)
-    assert bus.answers == [Message(0xC3, 0x09, 0, 0x80, 0x3F, 0x19, b"\x01")]
+    (answer,) = bus.answers
+    assert (answer.sender, answer.receiver, answer.attributes) == (0xC3, 0x09, 0x80)
+    assert (answer.cmdset, answer.cmdid, answer.payload) == (0x3F, 0x19, b"\x01")
     assert velocity(node) == STOP
 
 

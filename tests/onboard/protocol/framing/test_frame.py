@@ -173,3 +173,10 @@ def test_a_robot_needs_no_package_that_corrects(monkeypatch):
     assert encode_frame(1, framed_scheme(CODED), FAKE_SECRET) == frame
     with pytest.raises(MtmError, match=r"install it with: pip install 'messages-through-motion\[audit\]'"):
         decode_frame(frame, framed_scheme(CODED), FAKE_SECRET)
+
+
+def test_epoch_and_number_are_zero_unless_they_are_given():
+    scheme = framed_scheme(CODED)
+    symbols = encode_frame(7, scheme, FAKE_SECRET)
+    assert symbols == encode_frame(7, scheme, FAKE_SECRET, number=0, epoch=0)
+    assert decode_frame(symbols, scheme, FAKE_SECRET) == Frame(7, 0)
