@@ -1,29 +1,68 @@
-# `make demo` runs the main job, `make test` passes the tests; both set everything up first.
+# `make demo` runs the main job, `make test` passes the tests, `make test-all` also those that take long or need more than
+# Python packages. Each sets up first what it needs.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-STAMP := $(VENV)/.installed
 SITE_VENV := .venv-site
+OLDEST := build/oldest
+UV := build/uv/bin/uv
+# Further arguments of every pytest.
+PYTEST :=
+# The build without CUDA where the index offers it under this number.
+TORCH := torch==2.13.0
 
-.PHONY: setup demo test lint bench mutants firmware site deb deb-test clean
+.PHONY: setup demo site test test-all test-long test-oldest explore coverage lint peers bench mutants firmware \
+  firmware-mutants deb deb-test dist constraints clean
 
-setup: $(STAMP)
+# $(call install,folder,file): the packages that a file of constraints/ names, by hash, and the project itself.
+install = $(PYTHON) -m venv $(1) && \
+  $(1)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r constraints/$(2).txt && \
+  $(1)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 
-# uv when it is there, venv and pip when not.
-$(STAMP): pyproject.toml
-	@if command -v uv >/dev/null 2>&1; then \
-	  uv venv --quiet --allow-existing --python $(PYTHON) $(VENV) && uv pip install --quiet --python $(BIN)/python -e '.[dev]'; \
-	else \
-	  $(PYTHON) -m venv $(VENV) && $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'; \
-	fi
+setup: $(VENV)/.dev
+
+$(VENV)/.%: pyproject.toml constraints/%.txt
+	@$(call install,$(VENV),$*)
 	@touch $@
 
-demo: setup
+$(VENV)/.worlds: pyproject.toml constraints/worlds.txt
+	@$(call install,$(VENV),worlds)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check $(TORCH)
+	@touch $@
+
+demo: $(VENV)/.hil
 	rm -rf out/demo
 	$(BIN)/mtm-hil demo --out out/demo
 
 test: setup lint
-	$(BIN)/pytest
+	$(BIN)/pytest -m "not long and not peer" $(PYTEST)
+
+# Everything: what `make test` runs, and then the rest.
+test-all: test test-long test-oldest mutants firmware firmware-mutants peers site
+
+# VMAS's worlds, the C compilers and the emulator, and the wheel in clean environments.
+test-long: $(VENV)/.worlds
+	$(BIN)/pytest -m long $(PYTEST)
+
+# The lower end of each range of versions, whose warnings are not ours to mend; `make test` and `make test-long` have the upper one.
+test-oldest: $(OLDEST)/.oldest
+	$(OLDEST)/bin/python -m pytest -o filterwarnings= -m "not long and not peer" $(PYTEST) tests/audit tests/onboard
+
+$(OLDEST)/.oldest: pyproject.toml constraints/oldest.txt
+	@$(call install,$(OLDEST),oldest)
+	@touch $@
+
+# Property tests with other examples each time; SEED=... repeats a search.
+SEED := $(or $(SEED),$(shell od -An -N4 -tu4 /dev/urandom | tr -d ' '))
+explore: setup
+	@echo 'to reproduce: make explore SEED=$(SEED)'
+	@MTM_HYPOTHESIS=explore $(BIN)/pytest -m "hypothesis and not peer" --hypothesis-seed=$(SEED) tests \
+	  || { echo 'to reproduce: make explore SEED=$(SEED)'; exit 1; }
+
+# Lines and branches that no test reaches are printed; of what limits the robot and what both ends share there are none.
+coverage: setup
+	$(BIN)/pytest -m "not long and not peer" --cov --cov-report=term $(TESTS)
+	$(BIN)/coverage report --fail-under=100 --include='mtm_onboard/protocol/*,mtm_onboard/runtime/guard.py'
 
 lint: setup
 	$(BIN)/ruff format --check --quiet .
@@ -39,21 +78,48 @@ $(SITE_VENV)/.installed: docs/requirements.txt
 	$(SITE_VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r docs/requirements.txt
 	@touch $@
 
+# Programs of others that ours meet, each at the version that tests/peers/requirements names. One that cannot be installed
+# here is skipped with the reason, so this takes no $(PYTEST).
+peers: setup
+	$(BIN)/python tests/peers/install.py
+	$(BIN)/pytest tests/peers -m peer -rs
+
 firmware: setup
 	$(MAKE) -C firmware_shim
 
-deb:
-	$(PYTHON) packaging/build_deb.py
+firmware-mutants: setup
+	$(MAKE) -C firmware_shim mutants
+
+mutants: setup
+	$(BIN)/python -m tests.mutation $(if $(SECONDS),--seconds $(SECONDS))
+
+bench: setup
+	$(BIN)/pytest tests/benchmarks --benchmark-enable -s
+
+dist: setup
+	rm -rf dist
+	$(BIN)/python -m build
+	$(BIN)/twine check --strict dist/*
+
+deb: setup
+	$(BIN)/python packaging/build_deb.py
 
 # As root, with debootstrap and a network: installs the package into a clean Debian and drives a simulated robot there.
 deb-test: setup
 	MTM_CLEAN_ROOT=1 $(BIN)/pytest tests/packaging/test_clean_root.py -s
 
-mutants: setup
-	$(BIN)/python -m tests.mutation
+# Writes constraints/ anew: the newest versions within the ranges of pyproject.toml, and the oldest.
+compile = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
+  --custom-compile-command "make constraints" pyproject.toml --group build
+constraints: $(UV)
+	$(compile) --extra dev --extra worlds --overrides constraints/without_torch.in -o constraints/worlds.txt
+	$(compile) --extra dev -c constraints/worlds.txt -o constraints/dev.txt
+	$(compile) --extra hil -c constraints/worlds.txt -o constraints/hil.txt
+	$(compile) --extra dev --resolution lowest-direct -o constraints/oldest.txt
 
-bench: setup
-	$(BIN)/pytest tests/benchmarks --benchmark-enable -s
+$(UV):
+	$(PYTHON) -m venv build/uv
+	build/uv/bin/pip install --quiet --disable-pip-version-check uv
 
 clean:
-	rm -rf $(VENV) $(SITE_VENV) out build dist firmware_shim/build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(SITE_VENV) .peers out build dist firmware_shim/build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

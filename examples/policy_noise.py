@@ -22,7 +22,7 @@ RATE_HZ = 50.0
 POLICY_STD_MPS = 0.15
 # power = "ensemble" keeps each action's distribution exactly the policy's own.
 SCHEME = Scheme(
-    "point-mass", RATE_HZ, (0.5, 5.0), alphabet_size=16, message_ticks=800,
+    name="point-mass", rate_hz=RATE_HZ, band_hz=(0.5, 5.0), alphabet_size=16, message_ticks=800,
     channels=(Channel("point", "point", ("vx", "vy"), symbols=2, sigma=POLICY_STD_MPS),), power="ensemble",
 )  # fmt: skip
 GOALS_XY_M = np.array([[1.5, 0.0], [1.5, 1.5], [-0.5, 1.0], [0.0, 0.0]])

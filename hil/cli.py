@@ -51,6 +51,7 @@ def _every_command() -> None:
 
 @app.command()
 def record(
+    *,
     out: NewFolder,
     message: MessageNumber = None,
     no_message: NoMessage = False,
@@ -71,12 +72,25 @@ def record(
         from hil.commands.record import record as run
 
         film = None if no_video else camera.value
-        run(RecordOptions(out, seconds, message, key, wire.value, seed, film, realtime), console)
+        run(
+            RecordOptions(
+                out=out,
+                seconds=seconds,
+                message=message,
+                key=key,
+                wire=wire.value,
+                seed=seed,
+                camera=film,
+                realtime=realtime,
+            ),
+            console,
+        )
 
 
 @app.command()
 def film(
     world: Annotated[str, typer.Argument(metavar="WORLD", help="discovery, lunar-lander, reacher or football.")],
+    *,
     out: NewFolder,
     message: MessageNumber = None,
     no_message: NoMessage = False,
@@ -91,7 +105,12 @@ def film(
         from hil.commands.film import FilmOptions
         from hil.commands.film import film as run
 
-        run(FilmOptions(world, out, seconds, message, key, seed, renderer.value), console)
+        run(
+            FilmOptions(
+                world=world, out=out, seconds=seconds, message=message, key=key, seed=seed, renderer=renderer.value
+            ),
+            console,
+        )
 
 
 @app.command()

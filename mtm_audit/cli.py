@@ -37,7 +37,7 @@ def _version(asked: bool) -> None:
     if asked:
         from importlib.metadata import version
 
-        print(f"mtm-audit {version('mtm')}")
+        print(f"mtm-audit {version('messages-through-motion')}")
         raise typer.Exit
 
 

@@ -1,7 +1,7 @@
 """Builds the Debian package of mtm_onboard: `make deb` writes dist/mtm-onboard_VERSION_all.deb.
 
-Only the robot's side is packaged. The tree is laid out here and handed to dpkg-deb; times come from the newest commit,
-so that the same commit gives the same bytes.
+An argument names another folder than dist. Only the robot's side is packaged. The tree is laid out here and handed to
+dpkg-deb; times come from the newest commit, so that the same commit gives the same bytes.
 """
 
 import hashlib
@@ -13,6 +13,8 @@ import tempfile
 import tomllib
 from pathlib import Path
 
+from setuptools_scm import get_version
+
 ROOT = Path(__file__).resolve().parents[1]
 HERE = ROOT / "packaging"
 NAME = "mtm-onboard"
@@ -21,7 +23,7 @@ DEPENDS = "python3 (>= 3.11), python3-numpy, python3-can, python3-serial, adduse
 LAUNCHER = """#!/usr/bin/python3
 import sys
 
-from mtm_onboard.cli import main
+from mtm_onboard.__main__ import main
 
 sys.exit(main())
 """
@@ -36,15 +38,20 @@ License: Expat
 def main() -> None:
     """Lay the package's tree out and build it."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    version = str(project["version"])
-    out = ROOT / "dist" / f"{NAME}_{version}_all.deb"
+    version = debian_version(get_version(ROOT, fallback_version="0.0"))
+    out = (Path(sys.argv[1]) if sys.argv[1:] else ROOT / "dist").resolve() / f"{NAME}_{version}_all.deb"
     out.parent.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder)
         lay_out(tree)
         write_control(tree, version, str(project["description"]))
         build(tree, out)
-    print(f"wrote {out.relative_to(ROOT)}")
+    print(f"wrote {out}")
+
+
+def debian_version(version: str) -> str:
+    """The same version in Debian's order, where only what follows a tilde comes before its release."""
+    return version.replace(".dev", "~dev").replace("rc", "~rc")
 
 
 def lay_out(tree: Path) -> None:
@@ -61,7 +68,7 @@ def lay_out(tree: Path) -> None:
     place(documents / "copyright", COPYRIGHT + indented)
     for page in ("README.md", *(f"docs/{name}.md" for name in ("onboard", "doctor", "failsafes", "journal"))):
         place(documents / page, (ROOT / page).read_text(encoding="utf-8"))
-    for example in (ROOT / "docs/robot.example.toml", HERE / "cloud-init/user-data.yaml"):
+    for example in (*sorted((ROOT / "examples/robots").iterdir()), HERE / "cloud-init/user-data.yaml"):
         place(documents / "examples" / example.name, example.read_text(encoding="utf-8"))
     (tree / "etc/mtm").mkdir(parents=True)
 

@@ -19,16 +19,17 @@ PACKAGES = ("mtm_onboard", "mtm_audit", "hil")
 # a module; the longest name that fits is the room of a module. The package's own __init__ stands above all of them.
 LEVELS = {
     "mtm_onboard": (
-        "protocol", "model", "journal", "links", "runtime", "firmware", "control", "policies", "ros", "doctor",
-        "commands", "cli", "__main__",
+        "loading", "protocol", "model", "journal", "links", "runtime", "firmware", "control", "policies", "ros",
+        "doctor", "commands", "cli", "__main__",
     ),
     "mtm_audit": (
         "model", "readers", "tracking", "ingest", "detectors", "significance", "decoding", "reporting", "planning",
-        "commands", "cli",
+        "commands", "cli", "__main__",
     ),
     "hil": (
         "plants", "wires", "vehicles", "sensors", "worlds", "fleet", "experiments.runs", "experiments.detectors",
         "experiments.worlds", "experiments.messages", "experiments.hardening", "experiments", "commands", "cli",
+        "__main__",
     ),
 }  # fmt: skip
 

@@ -145,7 +145,13 @@ void mtm_shim_silence(mtm_shim *shim);
  *   below hold_ms     base + noise
  *   below zero_ms     base, fading linearly to zero; no noise
  *   zero_ms and more  zero
- * While stopped: zero. Constant memory, no division by a number that may be zero, every loop bounded. */
+ * While stopped: zero. Constant memory, no division by a number that may be zero, every loop bounded.
+ *
+ * The guard of the companion's program (mtm_onboard/runtime/guard.py) ages and fades commands alike and refuses what
+ * is not finite alike, and differs in its limits: it bounds the norm of (vx, vy), where here each axis is bounded by
+ * itself and the norm may reach sqrt(2) times the limit; it shortens the noise along its direction, where here the
+ * sum of base and noise is cut axis by axis; it bounds the noise in multiples of sigma, where here the image does,
+ * and the change of (vx, vy) from tick to tick, which here nothing does; and its stop cannot be released. */
 void mtm_shim_tick(mtm_shim *shim, uint32_t now_us, const mtm_velocity *base, mtm_velocity *out);
 
 /* Operator stop: output is zero from the next tick on, until mtm_shim_release and then a new command. The message's
@@ -215,20 +221,23 @@ typedef struct {
 /* What the gateway does with the companion's stream (CAN id 0x201). A speed command is set 3F, id 21, 12 bytes of
  * payload, not an acknowledgement, not encrypted.
  *
- * - Every frame leaves as it came, in order, as soon as it is whole: one frame time of delay, plus the poll. Only the
- *   payload and CRC16 of speed commands change. A value that shares its first byte with the frame before keeps that
- *   byte (the lowest of the mantissa), at a cost of 2^-17 of the value at most; where two or three bytes would be
- *   left behind, which happens only to senders that pack messages without aligning them, the frame waits for the next.
+ * - Every frame leaves as it came, those of an id in order, as soon as it is whole: one frame time of delay, plus the
+ *   poll. Only the payload and CRC16 of speed commands change. A value that shares its first byte with the frame
+ *   before keeps that byte (the lowest of the mantissa), at a cost of 2^-17 of the value at most; where two or three
+ *   bytes would be left behind, which happens only to senders that pack messages without aligning them, the frame
+ *   waits for the next.
  * - A command to which nothing is added and nothing limited leaves bit for bit as it came.
  * - A command whose CRC16 is wrong leaves with an equally wrong one and counts for nothing. A command that holds a
  *   NaN or an infinity leaves with the last good values in their place, fading as any stale command does.
  * - When commands stay away for hold_ms, or stop is latched, the gateway sends speed commands itself, one each tick:
- *   fading, then zero, until the companion's next; between two of its messages, or after 20 ms of waiting for the end
- *   of one, inside it (the robot then loses that message). Not before the first speed command, nor after wheel speed
- *   (3F/20), follow speed (3F/22), position move (3F/25) or work mode 0 (3F/19), unless stop is latched.
+ *   fading, then zero, until the companion's next; between two of its messages. Where a frame holds the end of one and
+ *   the beginning of another, the beginning waits meanwhile, in a frame of its own, for the frame after it. Only when a
+ *   message has begun to leave and does not end within 20 ms is it cut into; the robot then loses it. Not before the
+ *   first speed command, nor after wheel speed (3F/20), follow speed (3F/22), position move (3F/25) or work mode 0
+ *   (3F/19), unless stop is latched.
  * - While stop is latched the three other motion commands leave with a spoilt CRC16, so that the robot ignores them.
  * - `fill`: send base and noise each tick, between the companion's own messages, so that the waveform keeps its
- *   time when the companion does not. It finds room only with senders that begin each message in a frame of its own.
+ *   time when the companion does not.
  * The controller's frames pass untouched. */
 typedef struct {
     uint32_t rewritten; /* speed commands that left with other values */
@@ -250,7 +259,7 @@ typedef struct {
     mtm_duml_head head; /* of the last speed command */
     mtm_velocity arriving;
     uint32_t last_tick, due_us;
-    uint8_t queued, ready, gone, held_from, reverse_full, rewriting, changed, armed, fill, due;
+    uint8_t queued, ready, gone, held_from, holds_head, reverse_full, rewriting, changed, armed, fill, due;
 } mtm_gateway;
 
 /* `shim` and `board` must outlive the gateway; the shim is ticked by the gateway alone. */

@@ -26,6 +26,43 @@ static void release(mtm_gateway *gateway)
         gateway->slot[i] = NULL;
     }
     gateway->ready = gateway->queued;
+    gateway->holds_head = 0;
+}
+
+/* Whether commands of the gateway's own are wanted, to stop or to fill. */
+static uint8_t speaks(const mtm_gateway *gateway)
+{
+    const mtm_shim *shim = gateway->shim;
+    return shim->stopped || (gateway->armed && (gateway->fill || !mtm_guard_fresh(shim)));
+}
+
+/* The last frame ends one message and begins another: keep the beginning, in a frame of its own, until more of it
+ * comes, so that a command of ours has its place between the two. At most 7 bytes: none of them is of a value. */
+static void hold_head(mtm_gateway *gateway)
+{
+    const uint32_t size = gateway->parser.count;
+    mtm_frame *end = &gateway->queue[gateway->queued - 1];
+    mtm_frame *head = end + 1;
+    uint32_t i;
+    head->id = end->id;
+    head->size = (uint8_t)size;
+    end->size = (uint8_t)(end->size - size);
+    for (i = 0; i < size; i++) {
+        head->data[i] = end->data[end->size + i];
+    }
+    release(gateway);
+    gateway->queued++;
+    gateway->holds_head = 1;
+}
+
+/* A frame that is none of the stream does not wait for a held beginning, which stays the last in the queue. */
+static void overtake(mtm_gateway *gateway)
+{
+    mtm_frame *last = &gateway->queue[gateway->queued - 1];
+    const mtm_frame head = last[-1];
+    last[-1] = *last;
+    *last = head;
+    gateway->ready++;
 }
 
 /* Two or three bytes of a value have come and none has left: they cannot be known before the fourth. */
@@ -45,8 +82,16 @@ static void frame_arrived(mtm_gateway *gateway, const mtm_frame *frame)
             mtm_byte_arrived(gateway, &place->data[i]);
         }
     }
-    if (must_wait(gateway) && gateway->queued < MTM_QUEUE_FRAMES) {
+    if (gateway->queued == MTM_QUEUE_FRAMES) {
+        release(gateway);
+    } else if (must_wait(gateway)) {
         gateway->ready = gateway->held_from;
+        gateway->holds_head = 0;
+    } else if (place->id != COMPANION_STREAM && gateway->holds_head) {
+        overtake(gateway);
+    } else if (place->id == COMPANION_STREAM && gateway->parser.count > 0 && gateway->parser.count < place->size &&
+               speaks(gateway)) {
+        hold_head(gateway);
     } else {
         release(gateway);
     }
@@ -62,8 +107,10 @@ static uint8_t drain(mtm_gateway *gateway)
         }
         gateway->gone++;
     }
-    if (gateway->gone == gateway->queued) {
-        gateway->queued = 0;
+    if (gateway->gone == gateway->queued || gateway->holds_head) {
+        /* All has left, but for a held beginning. */
+        gateway->queue[0] = gateway->queue[gateway->gone & (MTM_QUEUE_FRAMES - 1)];
+        gateway->queued = (uint8_t)(gateway->queued - gateway->gone);
         gateway->gone = 0;
         gateway->ready = 0;
     }
@@ -72,12 +119,25 @@ static uint8_t drain(mtm_gateway *gateway)
 
 /* ---- Commands of the gateway's own ---- */
 
+#define INJECTED_FRAMES ((MTM_SPEED_BYTES + 7) / 8)
+
+/* Between two messages: what waits, if anything, is the held beginning of the next. */
+static uint8_t between_messages(const mtm_gateway *gateway)
+{
+    if (gateway->queued == 0) {
+        return gateway->parser.count == 0;
+    }
+    return gateway->holds_head && gateway->queued == 1;
+}
+
+/* Put a command of the gateway's own before the held beginning, if there is one. */
 static void inject(mtm_gateway *gateway)
 {
     uint8_t message[MTM_SPEED_BYTES];
     uint8_t payload[4 * MTM_AXES];
     mtm_velocity out;
     uint32_t i;
+    gateway->queue[INJECTED_FRAMES] = gateway->queue[0];
     mtm_output(gateway->shim, &out);
     for (i = 0; i < 4 * MTM_AXES; i++) {
         payload[i] = (uint8_t)(mtm_to_wire(i >> 2, out.axis[i >> 2]) >> (8 * (i & 3u)));
@@ -89,9 +149,9 @@ static void inject(mtm_gateway *gateway)
         frame->data[i & 7u] = message[i];
         frame->size = (uint8_t)((i & 7u) + 1);
     }
-    gateway->queued = (MTM_SPEED_BYTES + 7) / 8;
+    gateway->ready = INJECTED_FRAMES;
+    gateway->queued = (uint8_t)(gateway->queued + INJECTED_FRAMES);
     mtm_count(&gateway->counts.injected);
-    release(gateway);
 }
 
 /* Forget the message that is arriving: its sender fell silent in it, or a stop cannot wait for its end. */
@@ -109,7 +169,7 @@ static void speak(mtm_gateway *gateway)
 {
     const mtm_shim *shim = gateway->shim;
     const uint8_t halting = !mtm_guard_fresh(shim);
-    if (!shim->stopped && !(gateway->armed && (gateway->fill || halting))) {
+    if (!speaks(gateway)) {
         gateway->due = 0;
         gateway->last_tick = shim->tick;
         return;
@@ -117,10 +177,10 @@ static void speak(mtm_gateway *gateway)
     if (!gateway->due && shim->tick != gateway->last_tick) {
         mtm_make_due(gateway);
     }
-    if (gateway->due && halting && shim->last_us - gateway->due_us >= PATIENCE_US) {
+    if (gateway->due && halting && !between_messages(gateway) && shim->last_us - gateway->due_us >= PATIENCE_US) {
         cut_in(gateway);
     }
-    if (gateway->due && gateway->parser.count == 0 && gateway->queued == 0) {
+    if (gateway->due && between_messages(gateway)) {
         gateway->due = 0;
         gateway->last_tick = shim->tick;
         inject(gateway);

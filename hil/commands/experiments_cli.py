@@ -50,7 +50,7 @@ def false_alarms(
     with reported_console() as console:
         from hil.commands.false_alarms import false_alarms as run
 
-        run(decodes, detector, seed, workers, out, cells, console)
+        run(decodes, detector, seed, workers, out=out, cells=cells, console=console)
 
 
 def messages(
@@ -112,6 +112,7 @@ def sweep(
         str,
         typer.Argument(metavar="WORLD", help="The world: robomaster, discovery, lunar-lander, reacher or football."),
     ],
+    *,
     out: Annotated[Path, typer.Option(help="The accuracy table to write, for mtm-audit plan.")],
     rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each M and window.")] = 50,
     alphabet: Annotated[
@@ -136,17 +137,17 @@ def sweep(
         from hil.commands.sweep import sweep as run
 
         options = SweepOptions(
-            world,
-            rollouts,
-            tuple(alphabet or ()),
-            tuple(window or ()),
-            windows,
-            scheme,
-            detector,
-            first_seed,
-            workers,
-            out,
-            cells,
+            world=world,
+            rollouts=rollouts,
+            alphabet_sizes=tuple(alphabet or ()),
+            window_ticks=tuple(window or ()),
+            windows=windows,
+            scheme=scheme,
+            detector=detector,
+            first_seed=first_seed,
+            workers=workers,
+            out=out,
+            cells=cells,
         )
         run(options, console)
 

@@ -16,7 +16,7 @@ _LEVELS = (0.5, 0.1, 0.05, 0.01, 0.001, 0.0001)
 
 
 def false_alarms(
-    decodes: int, detector: str, seed: int, workers: int | None, out: Path | None, cells: Path, console: Console
+    decodes: int, detector: str, seed: int, workers: int | None, *, out: Path | None, cells: Path, console: Console
 ) -> None:
     """Measure, print and, where asked, write how often p-values fall below each level."""
     summaries = []

@@ -31,7 +31,7 @@ TRACKERS = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FilmOptions:
     """What the command line asked for; `message` None moves without one, `key` None makes a key."""
 

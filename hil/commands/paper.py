@@ -25,7 +25,7 @@ _FOOTBALL_COMPARED = 2
 _QUICK_ROLLOUTS = 1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class WorldOptions:
     """What the command line asked of the simulated worlds; `out` a CSV file, or a folder for several."""
 

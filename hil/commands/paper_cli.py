@@ -42,6 +42,7 @@ _Quick = Annotated[bool, typer.Option("--quick", help="One rollout of a few poin
 
 def _paper_worlds(
     context: typer.Context,
+    *,
     rollouts: _Rollouts = 50,
     quick: _Quick = False,
     seed: FirstSeed = 10_000,
@@ -54,7 +55,17 @@ def _paper_worlds(
         from hil.commands.paper import WorldOptions, paper_table
 
         paper_table(
-            str(context.info_name), WorldOptions(rollouts, quick, seed, renderer.value, workers, out, cells), console
+            str(context.info_name),
+            WorldOptions(
+                rollouts=rollouts,
+                quick=quick,
+                first_seed=seed,
+                renderer=renderer.value,
+                workers=workers,
+                out=out,
+                cells=cells,
+            ),
+            console,
         )
 
 

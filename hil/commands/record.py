@@ -24,7 +24,7 @@ KEY_NAME = "robot.key"
 LEAD_S = 1.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RecordOptions:
     """What the command line asked for.
 
@@ -50,11 +50,16 @@ def record(options: RecordOptions, console: Console) -> None:
     symbols = None if options.message is None or framed else symbols_of_number(options.message, key.scheme)
     sensors = Sensors(camera=None if options.camera is None else CAMERAS[options.camera])
     settings = RunSettings(
-        key, symbols, options.seconds, options.seed, options.wire, START_S if options.realtime else LEAD_S,
+        key=key,
+        symbols=symbols,
+        seconds=options.seconds,
+        seed=options.seed,
+        wire=options.wire,
+        start_s=START_S if options.realtime else LEAD_S,
         payload=options.message if framed else None,
         # A rolling schedule needs a time of day, and a recording made now has this one.
         unix_s=time.time() if key.scheme.schedule == "rolling" and not options.realtime else None,
-    )  # fmt: skip
+    )
     with new_folder(options.out) as folder:
         if options.key is None:
             save_key(key, folder / KEY_NAME)

@@ -16,7 +16,7 @@ _ALPHABET_SIZES = (4, 16, 64)
 _WINDOW_TICKS = (30, 45, 60, 80, 110, 150)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SweepOptions:
     """What the command line asked for: `scheme`, or a grid of alphabets and windows (the usual ones where empty).
 

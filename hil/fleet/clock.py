@@ -40,3 +40,19 @@ class SimulatedClock:
             heapq.heapreplace(due, (at_us + period_us, order, period_us, callback))
             callback(self._now_us / _MICRO)
         self._now_us = max(self._now_us, deadline_us)
+
+
+class AnsweringClock:
+    """A clock for a link that is opened before the run begins: whoever waits on it is answered, and no time passes."""
+
+    def __init__(self, clock: SimulatedClock, answer: Callable[[float], None]) -> None:
+        self._clock = clock
+        self._answer = answer
+
+    def now(self) -> float:
+        """The other clock's time."""
+        return self._clock.now()
+
+    def sleep_until(self, deadline_s: float) -> None:
+        """Have the far end do what is due."""
+        self._answer(self._clock.now())

@@ -1,14 +1,14 @@
 """A transport without a wire: commands reach the motion controller rounded as a CAN message rounds them."""
 
 from hil.vehicles.motion_controller import MotionController
-from mtm_onboard.links.base import Transport
+from mtm_onboard.links.base import Link
 from mtm_onboard.links.robomaster_messages import speed_payload, speed_velocity
 from mtm_onboard.model.clock import Clock
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import MtmError
 
 
-class DirectTransport(Transport):
+class DirectLink(Link):
     """Hands each command to `controller` after the 32-bit round trip of a RoboMaster speed message.
 
     The motion is the same bit for bit as over the simulated CAN bus with the controller advanced at the same instants.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hil.fleet.clock import SimulatedClock
-from hil.fleet.direct import DirectTransport
+from hil.fleet.clock import AnsweringClock, SimulatedClock
+from hil.fleet.direct import DirectLink
 from hil.fleet.rig import LIMITS, SAMPLE_PERIOD_S, RobotReport, RunResult, RunSettings, Wire, seeds_of
 from hil.plants.mecanum import MecanumPlant
 from hil.sensors.poses import Floats, Trajectory
@@ -21,8 +21,8 @@ from hil.wires.byte_pipe import PipeEnd, byte_pipe
 from hil.wires.can_line import can_line
 from hil.wires.plaintext_line import plaintext_line
 from hil.worlds.robomaster import Route, Task, routes
-from mtm_onboard.links.base import Transport
-from mtm_onboard.links.mavlink import MavlinkTransport
+from mtm_onboard.links.base import Link
+from mtm_onboard.links.mavlink import MavlinkLink
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.model.velocity import STOP
 from mtm_onboard.protocol import Channel
@@ -44,14 +44,14 @@ class _Link:
     `stop_releases_motors` says whether a stop over this wire switches the motors off as well.
     """
 
-    transport: Transport
+    transport: Link
     poll: Callable[[float], None]
     faults: Callable[[], int]
     shutdown: Callable[[], None]
     stop_releases_motors: bool = True
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Robot:
     name: str
     plant: MecanumPlant
@@ -71,9 +71,16 @@ class _Robot:
         guard, controller = self.guard, self.controller
         is_stopped = controller.demand == STOP and not (self.link.stop_releases_motors and controller.work_mode)
         return RobotReport(
-            self.name, stats.sent, stats.missed, guard.clamped, guard.stale, guard.refused, self.link.faults(),
-            controller.deadman_stops, is_stopped,
-        )  # fmt: skip
+            name=self.name,
+            sent=stats.sent,
+            missed=stats.missed,
+            clamped=guard.clamped,
+            stale=guard.stale,
+            refused=guard.refused,
+            faults=self.link.faults(),
+            deadman_stops=controller.deadman_stops,
+            is_stopped=is_stopped,
+        )
 
 
 def run_lockstep(settings: RunSettings) -> RunResult:
@@ -101,7 +108,7 @@ def _run(settings: RunSettings, clock: SimulatedClock, robots: list[_Robot]) -> 
             x_m, y_m = plant.position_xy_m
             poses.extend((x_m, y_m, plant.heading_rad))
 
-    def step(tick: int, now_s: float) -> None:
+    def step(tick: int, now_s: float, _late_s: float) -> None:
         for robot in robots:
             robot.step(tick, now_s)
 
@@ -116,7 +123,7 @@ def _run(settings: RunSettings, clock: SimulatedClock, robots: list[_Robot]) -> 
     return RunResult(_trajectories(names, motion), settings.onset_s, tuple(robot.report(stats) for robot in robots))
 
 
-def _loop(settings: RunSettings, clock: SimulatedClock, step: Callable[[int, float], None]) -> LoopStats:
+def _loop(settings: RunSettings, clock: SimulatedClock, step: Callable[[int, float, float], None]) -> LoopStats:
     # A tick that falls on the very end would have no motion to show.
     end_s = settings.seconds - 1e-6
     return run_loop(
@@ -125,11 +132,11 @@ def _loop(settings: RunSettings, clock: SimulatedClock, step: Callable[[int, flo
 
 
 @contextmanager
-def _opened(transports: list[Transport], clock: SimulatedClock) -> Iterator[None]:
+def _opened(transports: list[Link], clock: SimulatedClock) -> Iterator[None]:
     with ExitStack() as stack:
         for transport in transports:
             stack.enter_context(transport)
-            if not isinstance(transport, DirectTransport):
+            if not isinstance(transport, DirectLink):
                 clock.every(transport.service_period_s, transport.service)
         yield
 
@@ -155,7 +162,16 @@ def _robot(
     guard = Guard(LIMITS, Staleness(), noise_sigma=channel.sigma, period_s=period_s)
     modulator = None if message is None else _modulator(settings, channel, message)
     runtime = Runtime(modulator, guard, source, link.transport)
-    return _Robot(channel.body, plant, controller, link, settings.task(route, slip_seed), source, guard, runtime)
+    return _Robot(
+        name=channel.body,
+        plant=plant,
+        controller=controller,
+        link=link,
+        task=settings.task(route, slip_seed),
+        source=source,
+        guard=guard,
+        runtime=runtime,
+    )
 
 
 def _modulator(settings: RunSettings, channel: Channel, message: Message) -> NoiseAdder:
@@ -175,12 +191,13 @@ def _wired(wire: Wire, plant: MecanumPlant, clock: SimulatedClock) -> tuple[Moti
         vehicle = MavlinkVehicle(COPTER, plant, theirs, is_guided=True, is_armed=True)
         return vehicle.controller, _mavlink_link(vehicle, ours, clock)
     controller = MotionController(plant)
-    return controller, _can_link(controller) if wire == "can" else _direct_link(controller, clock)
+    return controller, _can_link(controller, clock) if wire == "can" else _direct_link(controller, clock)
 
 
-def _can_link(controller: MotionController) -> _Link:
+def _can_link(controller: MotionController, clock: SimulatedClock) -> _Link:
     ours, theirs = can_line()
-    node, transport = CanMotionController(controller, theirs), RoboMasterCan(ours)
+    node = CanMotionController(controller, theirs)
+    transport = RoboMasterCan(ours, clock=AnsweringClock(clock, node.poll))
 
     def faults() -> int:
         wrong = node.faults + node.ignored_messages + node.malformed_messages + node.bus_errors
@@ -202,7 +219,7 @@ def _plaintext_link(controller: MotionController) -> _Link:
 
 
 def _mavlink_link(vehicle: MavlinkVehicle, ours: PipeEnd, clock: SimulatedClock) -> _Link:
-    transport = MavlinkTransport(profile="copter", clock=clock, open_port=lambda: ours)
+    transport = MavlinkLink(profile="copter", clock=clock, open_port=lambda: ours)
 
     def faults() -> int:
         health = transport.health()
@@ -213,7 +230,7 @@ def _mavlink_link(vehicle: MavlinkVehicle, ours: PipeEnd, clock: SimulatedClock)
 
 
 def _direct_link(controller: MotionController, clock: SimulatedClock) -> _Link:
-    return _Link(DirectTransport(controller, clock), controller.advance, lambda: controller.faults, lambda: None)
+    return _Link(DirectLink(controller, clock), controller.advance, lambda: controller.faults, lambda: None)
 
 
 def _trajectories(names: list[str], motion: Floats) -> tuple[Trajectory, ...]:

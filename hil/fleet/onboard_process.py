@@ -11,7 +11,7 @@ from hil.fleet.rig import LIMITS, RobotReport
 from hil.fleet.serial_wires import SerialWire
 from mtm_onboard.model.velocity import STOP
 from mtm_onboard.protocol import MtmError
-from mtm_onboard.protocol.journal_file import CLAMPED, REFUSED, STALE, JournalRecord, read_journal
+from mtm_onboard.protocol.journal_file import CLAMPED, REFUSED, STALE, UNSENT, JournalRecord, read_journal
 
 _TERMINATION_TIMEOUT_S = 5.0
 
@@ -93,13 +93,21 @@ class OnboardProcess:
         median_s, late_s = np.quantile(journal.lateness_s, (0.5, 0.99))
         is_stopped = controller.demand == STOP and not (self._wire.stop_releases_motors and controller.work_mode)
         return RobotReport(
-            self.name, sent, missed, clamped, stale, refused, self._wire.faults(),
-            controller.deadman_stops, is_stopped, (float(median_s), float(late_s)),
-        )  # fmt: skip
+            name=self.name,
+            sent=sent,
+            missed=missed,
+            clamped=clamped,
+            stale=stale,
+            refused=refused,
+            faults=self._wire.faults(),
+            deadman_stops=controller.deadman_stops,
+            is_stopped=is_stopped,
+            late_s=(float(median_s), float(late_s)),
+        )
 
 
 def check_ticks(name: str, journal: JournalRecord) -> tuple[int, int]:
-    """Ticks sent, and ticks missed between the first and the last one.
+    """Ticks that were sent, and ticks missed between the first and the last one.
 
     Raises MtmError when the journal is empty or damaged, begins after the message does, or has a tick twice.
     """
@@ -110,7 +118,8 @@ def check_ticks(name: str, journal: JournalRecord) -> tuple[int, int]:
         raise MtmError(f"{name} began at tick {ticks[0]}, after the message had; run it again on a less busy machine")
     if np.any(np.diff(ticks) < 1):
         raise MtmError(f"{name} sent a tick twice, which must never happen; see its journal")
-    return len(ticks), int(ticks[-1] - ticks[0] + 1) - len(ticks)
+    sent = int(np.count_nonzero((journal.flags & UNSENT) == 0))
+    return sent, int(ticks[-1] - ticks[0] + 1) - len(ticks)
 
 
 def _free_udp_port() -> int:

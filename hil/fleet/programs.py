@@ -4,6 +4,7 @@ import sysconfig
 from pathlib import Path
 
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.installing import install_command
 
 # Numerical libraries read these when they are loaded. Several computing processes with more threads than there are
 # cores slow each other down.
@@ -14,5 +15,5 @@ def program(name: str) -> str:
     """Path of an installed program such as mtm-audit; raises MtmError when it is not there."""
     path = Path(sysconfig.get_path("scripts")) / name
     if not path.is_file():
-        raise MtmError(f"{name} is not installed beside mtm-hil; install the project with pip install -e .")
+        raise MtmError(f"{name} is not installed beside mtm-hil; install both with: {install_command('hil')}")
     return str(path)

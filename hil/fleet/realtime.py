@@ -96,7 +96,7 @@ def _drive(
     poses, times_s = array("d"), array("d")
     last = -1
 
-    def step(tick: int, now_s: float) -> None:
+    def step(tick: int, now_s: float, _late_s: float) -> None:
         nonlocal last
         since_s = now_s - began_s
         for robot in robots:

@@ -28,7 +28,7 @@ SAMPLE_PERIOD_S = 0.01
 LIMITS = Limits(speed_mps=1.0, turn_rate_radps=2.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RunSettings:
     """A run of `seconds`, whose message begins at `start_s` and repeats until the end.
 
@@ -111,7 +111,7 @@ def seeds_of(seed: int) -> Seeds:
     return Seeds(tuple(int(word) for word in slips.generate_state(ROBOTS, np.uint64)), world, sensors)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RobotReport:
     """Counts of one robot, in ticks unless noted; `faults` counts what either end of its link found wrong.
 

@@ -23,7 +23,7 @@ PLANT_FILE = Path(__file__).with_name("robomaster_plant.toml")
 _BLOCK = 4096
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MecanumParameters:
     """What the calibration file holds: seconds, m/s, rad/s; slips are standard deviations."""
 

@@ -17,7 +17,7 @@ from mtm_onboard.protocol.errors import MtmError
 NOISE_SLACK_PX = 64
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Camera:
     """Optics, shutter and sensor.
 

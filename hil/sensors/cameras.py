@@ -3,16 +3,34 @@
 from hil.sensors.camera import Camera
 from hil.sensors.optics import Optics, overhead
 
-_TILTED = Optics((0.6, -4.6, 4.4), (0.0, 0.0, 0.0), focal_px=1080.0, width_px=1280, height_px=960, radial=(-0.05, 0.0))
+_TILTED = Optics(
+    position_m=(0.6, -4.6, 4.4),
+    target_m=(0.0, 0.0, 0.0),
+    focal_px=1080.0,
+    width_px=1280,
+    height_px=960,
+    radial=(-0.05, 0.0),
+)
 
 CAMERAS: dict[str, Camera] = {
     # Fixed under the ceiling, as a tracking system's would be.
-    "overhead": Camera(overhead(), noise_levels=1.0, blur_px=0.6),
+    "overhead": Camera(optics=overhead(), noise_levels=1.0, blur_px=0.6),
     # On a stand beside the arena, with a lens that distorts and a shutter that takes its time.
-    "tilted": Camera(_TILTED, noise_levels=1.0, blur_px=0.6, exposure_s=0.004, sub_exposures=2),
+    "tilted": Camera(optics=_TILTED, noise_levels=1.0, blur_px=0.6, exposure_s=0.004, sub_exposures=2),
     # Held by hand: uneven frames, some of them lost, and a longer shutter.
     "phone": Camera(
-        Optics((0.3, -4.4, 4.6), (0.05, 0.0, 0.0), focal_px=1060.0, width_px=1280, height_px=960, roll_rad=0.08),
-        jitter_s=0.004, drop_probability=0.02, exposure_s=0.008, noise_levels=2.0, blur_px=0.8,
+        optics=Optics(
+            position_m=(0.3, -4.4, 4.6),
+            target_m=(0.05, 0.0, 0.0),
+            focal_px=1060.0,
+            width_px=1280,
+            height_px=960,
+            roll_rad=0.08,
+        ),
+        jitter_s=0.004,
+        drop_probability=0.02,
+        exposure_s=0.008,
+        noise_levels=2.0,
+        blur_px=0.8,
     ),
-}  # fmt: skip
+}

@@ -9,7 +9,7 @@ from hil.sensors.poses import Floats
 from mtm_onboard.protocol.errors import MtmError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Optics:
     """Where the camera stands, where it looks, and how it maps rays to pixels.
 
@@ -88,4 +88,10 @@ class Optics:
 def overhead(span_m: float = 4.6, height_m: float = 5.0, width_px: int = 704, height_px: int = 704) -> Optics:
     """A camera straight above the origin, at `height_m`, that sees `span_m` of floor along its shorter side."""
     focal_px = min(width_px, height_px) * height_m / span_m
-    return Optics((0.0, 0.0, height_m), (0.0, 0.0, 0.0), focal_px, width_px, height_px)
+    return Optics(
+        position_m=(0.0, 0.0, height_m),
+        target_m=(0.0, 0.0, 0.0),
+        focal_px=focal_px,
+        width_px=width_px,
+        height_px=height_px,
+    )

@@ -4,9 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from hil.plants.mecanum import RIM_MPS_PER_RPM, body_velocity
+from hil.vehicles.can_topics import KNOWN_TOPICS, pushed_data
 from hil.vehicles.motion_controller import MotionController
 from hil.vehicles.odometry import Odometry, turned
-from mtm_onboard.links.can_stream import Bus, CanStream
+from mtm_onboard.links.can_bus import Bus
+from mtm_onboard.links.can_stream import CanStream
 from mtm_onboard.links.duml import ACK, WANTS_ACK, Message
 from mtm_onboard.links.robomaster_messages import (
     CHASSIS,
@@ -25,14 +27,14 @@ from mtm_onboard.links.robomaster_messages import (
 from mtm_onboard.links.robomaster_telemetry import (
     ADD_NODE,
     PUSH,
+    RESET_NODE,
     SUBSCRIBE,
-    TOPICS,
     UNSUBSCRIBE,
     Subscription,
     Telemetry,
     parse_subscription,
     parse_unsubscription,
-    push_payload,
+    push_head,
 )
 from mtm_onboard.protocol import MtmError
 
@@ -65,11 +67,19 @@ class CanMotionController:
 
     Obeyed are work mode, speed, wheel speed, and the subscription commands; heartbeats are counted. Anything else,
     and answers, are counted in `ignored_messages`; payloads that contradict their command in `malformed_messages`.
-    Pushed poses are relative to the pose at construction, as a robot's are to where it was switched on.
+    Pushed poses are relative to the pose at construction, as a robot's are to where it was switched on. Topics of a
+    subscription that are not known are left out of its pushes, and the first is named in the answer.
+
+    `can_engage` False is a robot that answers the work mode with an error, and `acknowledges` False one that answers
+    no work mode.
     """
 
-    def __init__(self, controller: MotionController, bus: Bus) -> None:
+    def __init__(
+        self, controller: MotionController, bus: Bus, *, can_engage: bool = True, acknowledges: bool = True
+    ) -> None:
         self.controller = controller
+        self.can_engage = can_engage
+        self.acknowledges = acknowledges
         self.heartbeats = 0
         self.ignored_messages = 0
         self.malformed_messages = 0
@@ -85,6 +95,7 @@ class CanMotionController:
                 (WHEEL_SPEED, self._on_wheel_speed),
                 (WORK_MODE, self._on_work_mode),
                 (ADD_NODE, self._on_add_node),
+                (RESET_NODE, self._on_reset_node),
                 (SUBSCRIBE, self._on_subscribe),
                 (UNSUBSCRIBE, self._on_unsubscribe),
             )
@@ -104,8 +115,7 @@ class CanMotionController:
         self.controller.advance(now_s)
         for stream in self._streams.values():
             if stream.is_due(now_s):
-                payload = push_payload(stream.subscription, self._telemetry(now_s))
-                self._send(PUSH.message(self._sequence.next(PUSH), payload))
+                self._send(PUSH.message(self._sequence.next(PUSH), self._push(stream.subscription, now_s)))
 
     def shutdown(self) -> None:
         """Leave the bus."""
@@ -146,9 +156,12 @@ class CanMotionController:
         self.controller.command_speed(now_s, *body_velocity((one, two, three, four)))
         return _DONE
 
-    def _on_work_mode(self, message: Message, _now_s: float) -> bytes:
-        self.controller.set_work_mode(is_work_mode_on(message.payload))
-        return _DONE
+    def _on_work_mode(self, message: Message, _now_s: float) -> bytes | None:
+        is_on = is_work_mode_on(message.payload)
+        if is_on and not self.can_engage:
+            return _REFUSED
+        self.controller.set_work_mode(is_on)
+        return _DONE if self.acknowledges else None
 
     def _on_heartbeat(self, _message: Message, _now_s: float) -> None:
         self.heartbeats += 1
@@ -156,10 +169,14 @@ class CanMotionController:
     def _on_add_node(self, _message: Message, _now_s: float) -> bytes:
         return _DONE + bytes((PUBLISHER,))
 
+    def _on_reset_node(self, _message: Message, _now_s: float) -> bytes:
+        self._streams.clear()
+        return _DONE
+
     def _on_subscribe(self, message: Message, now_s: float) -> bytes:
         wanted = parse_subscription(message.payload)
-        unknown = next((topic for topic in wanted.topics if topic not in TOPICS), 0)
-        granted = not unknown and 1 <= wanted.rate_hz <= MOST_PUSHES_HZ
+        unknown = next((topic for topic in wanted.topics if topic not in KNOWN_TOPICS), 0)
+        granted = 1 <= wanted.rate_hz <= MOST_PUSHES_HZ
         if granted:
             self._streams[wanted.stream] = _Stream(wanted, now_s)
         head = _DONE if granted else _REFUSED
@@ -168,6 +185,11 @@ class CanMotionController:
     def _on_unsubscribe(self, message: Message, _now_s: float) -> bytes:
         known = self._streams.pop(parse_unsubscription(message.payload), None) is not None
         return _DONE if known else _REFUSED
+
+    def _push(self, subscription: Subscription, now_s: float) -> bytes:
+        telemetry, velocity = self._telemetry(now_s), self.controller.plant.velocity_body
+        data = [pushed_data(topic, telemetry, velocity) for topic in subscription.topics]
+        return push_head(subscription, now_s) + b"".join(data)
 
     def _telemetry(self, now_s: float) -> Telemetry:
         body_x, body_y, _ = self.controller.plant.velocity_body

@@ -20,6 +20,8 @@ _SET_MODE, _ARM_DISARM = 176, 400  # MAV_CMD
 _CUSTOM_MODE, _ARMED = 1, 128  # MAV_MODE_FLAG
 _ACCEPTED, _REJECTED_FOR_NOW, _UNSUPPORTED, _FAILED = 0, 1, 3, 4  # MAV_RESULT
 _CRITICAL = 2  # MAV_SEVERITY
+_REAL32 = 9  # MAV_PARAM_TYPE
+_ADDRESSED = ("SET_POSITION_TARGET_LOCAL_NED", "COMMAND_LONG", "PARAM_REQUEST_LIST", "PARAM_REQUEST_READ")
 _ACTIVE = 4  # MAV_STATE
 _MOST_READS = 256
 # A push that is due within this part of a period counts as due: instants are sums of decimal fractions.
@@ -29,10 +31,11 @@ _SLACK = 1e-6
 class MavlinkVehicle:
     """A vehicle with `firmware` over `plant`; `poll` does everything that is due.
 
-    It obeys set-points and requests that are addressed to it, the former only in its guided mode and armed, and counts
-    in `ignored_setpoints` those that it ignores for their frame, mask or values. `signing_key` has it require
-    signatures. A vehicle that `goes_on` never stops for want of set-points, the worst that one could do. `can_arm`
-    False is a vehicle whose own checks fail. `pilot_switches` and `pilot_disarms` are the pilot's doing.
+    It obeys set-points and requests that are addressed to it, the former only in its guided mode and armed, tells its
+    parameters to whoever asks, and counts in `ignored_setpoints` those that it ignores for their frame, mask or values.
+    `signing_key` has it require signatures. A vehicle that `goes_on` never stops for want of set-points, the worst that
+    one could do. `can_arm` False is a vehicle whose own checks fail. `pilot_switches` and `pilot_disarms` are the
+    pilot's doing.
     """
 
     def __init__(
@@ -123,13 +126,32 @@ class MavlinkVehicle:
         kind = message.get_type()
         if kind == "HEARTBEAT":
             self.companion_heartbeats += 1
-        elif kind in ("SET_POSITION_TARGET_LOCAL_NED", "COMMAND_LONG"):
-            if message.target_system not in (0, SYSTEM_ID) or message.target_component not in (0, COMPONENT_ID):
+            return
+        if kind in _ADDRESSED and message.target_system in (0, SYSTEM_ID):
+            if message.target_component not in (0, COMPONENT_ID):
                 return
             if kind == "COMMAND_LONG":
                 self._answer(message, now_s)
-            else:
+            elif kind == "SET_POSITION_TARGET_LOCAL_NED":
                 self._take_setpoint(message, now_s)
+            else:
+                self._tell_parameters(message)
+
+    def _tell_parameters(self, request: Any) -> None:
+        """One or all; a parameter that is not there has no answer, as on a real one."""
+        parameters = self.firmware.parameters
+        wanted = list(range(len(parameters)))
+        if request.get_type() == "PARAM_REQUEST_READ":
+            name = request.param_id
+            wanted = [
+                index
+                for index, (known, _) in enumerate(parameters)
+                if (known == name if request.param_index < 0 else index == request.param_index)
+            ]
+        messages = self._codec.messages
+        for index in wanted:
+            name, value = parameters[index]
+            self._send(messages.MAVLink_param_value_message(name.encode(), value, _REAL32, len(parameters), index))
 
     def _take_setpoint(self, setpoint: Any, now_s: float) -> None:
         velocity = self.firmware.velocity(setpoint, self.controller.plant.heading_rad)
@@ -157,7 +179,9 @@ class MavlinkVehicle:
         parameters = request.param1, request.param2, request.param3
         if request.command not in (_SET_MODE, _ARM_DISARM):
             return _UNSUPPORTED
-        if not all(math.isfinite(value) and 0 <= value < 256 for value in parameters):
+        # Of the second parameter of arming, and of the third of a mode, some clients make no number.
+        told = parameters[:1] if request.command == _ARM_DISARM else (*parameters[:2], _number(parameters[2]))
+        if not all(math.isfinite(value) and 0 <= value < 256 for value in told):
             return _FAILED
         if request.command == _ARM_DISARM:
             if parameters[0] == 1.0 and not self.can_arm:
@@ -211,3 +235,8 @@ class MavlinkVehicle:
         north, west = cosine * ahead - sine * left, sine * ahead + cosine * left
         self._send(messages.MAVLink_attitude_message(boot_ms, 0.0, 0.0, yaw_rad, 0.0, 0.0, -turn))
         self._send(messages.MAVLink_local_position_ned_message(boot_ms, x_m, -y_m, 0.0, north, -west, 0.0))
+
+
+def _number(value: float) -> float:
+    """What is not a number stands for nothing said."""
+    return 0.0 if math.isnan(value) else value

@@ -6,6 +6,7 @@ from hil.plants.mecanum import RIM_MPS_PER_RPM, body_velocity, wheel_rims_mps
 from hil.vehicles.motion_controller import MotionController
 from hil.vehicles.odometry import Odometry
 from hil.vehicles.plaintext_grammar import DONE, FAILED, PARSE_ERROR, RefusalError, parse_command, values
+from hil.vehicles.plaintext_move import MOVE_KEYS, Move, move
 from hil.vehicles.plaintext_pushes import Pushes, push_text
 from hil.wires.plaintext_ports import Port
 from mtm_onboard.links.plaintext_messages import MOST_DEGPS, MOST_MPS, Splitter
@@ -29,9 +30,9 @@ class PlaintextMotionController:
     holds until the next one or the end of SDK mode. While the gimbal leads, the chassis ignores turns.
 
     Obeyed are `command`, `quit`, `version`, `robot mode`, `robot battery ?`, and `chassis` with `speed`, `wheel`,
-    `push` and the queries; anything else fails. `obeyed` and `refused` count commands of the port that has the robot,
-    `unheard` those of the others, `dropped` those beyond what the robot queues. With `pushes_heading` pushed positions
-    have the heading as a third number, as newer firmware sends, and otherwise two.
+    `move`, `push` and the queries; anything else fails. `obeyed` and `refused` count commands of the port that has the
+    robot, `unheard` those of the others, `dropped` those beyond what the robot queues. With `pushes_heading` pushed
+    positions have the heading as a third number, as newer firmware sends, and otherwise two.
     """
 
     def __init__(self, controller: MotionController, ports: Sequence[Port], *, pushes_heading: bool = True) -> None:
@@ -43,6 +44,7 @@ class PlaintextMotionController:
         self.mode = MODES[0]
         self._splitters = {port: Splitter(_LONGEST_COMMAND) for port in ports}
         self._owner: Port | None = None
+        self._move: Move | None = None
         self._pushes_heading = pushes_heading
         self._pushes = Pushes()
         self._odometry = Odometry(controller.plant)
@@ -54,6 +56,7 @@ class PlaintextMotionController:
             "robot battery": lambda words, _: _answer_query(words, _BATTERY),
             "chassis speed": self._on_speed,
             "chassis wheel": self._on_wheel,
+            "chassis move": self._on_move,
             "chassis push": self._on_push,
             "chassis position": lambda words, _: _answer_query(words, self._position(with_heading=True)),
             "chassis attitude": lambda words, _: _answer_query(words, self._attitude()),
@@ -74,6 +77,7 @@ class PlaintextMotionController:
         """Obey what has arrived, advance the plant to `now_s` and push what is due."""
         for port, text in self._received():
             self._obey(port, text, now_s)
+        self._go_on(now_s)
         self.controller.advance(now_s)
         due = self._pushes.due(now_s)
         if due and self._owner is not None:
@@ -132,8 +136,15 @@ class PlaintextMotionController:
         # Of other parts of the robot, such as a gimbal or an arm, this one has none.
         raise RefusalError(FAILED)
 
+    def _go_on(self, now_s: float) -> None:
+        """The chassis follows a move to its end, and then stands still."""
+        if self._move is not None:
+            self.controller.command_speed(now_s, *self._move.velocity(now_s))
+            if self._move.is_over(now_s):
+                self._move = None
+
     def _release(self) -> None:
-        self._owner = None
+        self._owner = self._move = None
         self.mode = MODES[0]
         self._pushes.clear()
         self.controller.set_work_mode(False)
@@ -161,6 +172,7 @@ class PlaintextMotionController:
             raise RefusalError(FAILED)
         if self.mode == "gimbal_lead":
             clockwise = 0.0
+        self._move = None
         self.controller.command_speed(now_s, forward, flipped(rightward), counter_clockwise_rad(clockwise))
         return DONE
 
@@ -172,8 +184,13 @@ class PlaintextMotionController:
         front_right, front_left, rear_left, rear_right = (
             wanted.get(key, 0.0) * RIM_MPS_PER_RPM for key in ("w1", "w2", "w3", "w4")
         )
+        self._move = None
         velocity = body_velocity((front_left, front_right, rear_left, rear_right))
         self.controller.command_speed(now_s, *velocity)
+        return DONE
+
+    def _on_move(self, words: tuple[str, ...], now_s: float) -> str:
+        self._move = move(values(words, MOVE_KEYS), now_s)
         return DONE
 
     def _on_push(self, words: tuple[str, ...], now_s: float) -> str:
@@ -203,10 +220,9 @@ class PlaintextMotionController:
             rim_mps / RIM_MPS_PER_RPM for rim_mps in wheel_rims_mps(velocity)
         )
         # The rear wheels come in the other order than in `chassis wheel`, as that client reads them.
-        return _numbers(
-            velocity.vx_mps, flipped(velocity.vy_mps), clockwise_deg(velocity.wz_radps),
-            front_right, front_left, rear_right, rear_left,
-        )  # fmt: skip
+        speeds = _numbers(velocity.vx_mps, flipped(velocity.vy_mps), clockwise_deg(velocity.wz_radps))
+        # Turns a minute are whole numbers: a client that is used with robots reads them as such.
+        return speeds + "".join(f"{round(rpm)} " for rpm in (front_right, front_left, rear_right, rear_left))
 
 
 def _numbers(*numbers: float) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.installing import install_command
 
 SOURCES = Path(__file__).resolve().parents[2] / "firmware_shim"
 HEADER = SOURCES / "include" / "mtm_shim.h"
@@ -33,7 +34,9 @@ def load_shim() -> Shim:
     try:
         from cffi import FFI
     except ImportError as error:
-        raise MtmError("the C shim needs cffi; install mtm[dev]") from error
+        raise MtmError(
+            f"the C shim needs cffi, which is not installed; install it with: {install_command('hil')}"
+        ) from error
     if not HEADER.exists():
         raise MtmError(f"the C shim's sources are not in {SOURCES}; run from a checkout of the project")
     ffi = FFI()

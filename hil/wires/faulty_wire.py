@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import can
 
 from mtm_onboard.links.base import LinkBusyError
-from mtm_onboard.links.byte_link import ByteLink
+from mtm_onboard.links.byte_stream import ByteStream
 from mtm_onboard.links.robomaster_messages import FROM_COMPANION_ID, FROM_MOTION_CONTROLLER_ID
 from mtm_onboard.model.clock import Clock
 from mtm_onboard.protocol import MtmError
@@ -20,7 +20,7 @@ from mtm_onboard.protocol import MtmError
 _MAX_BYTES_CHANGED = 3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class WireFaults:
     """Faults of one direction.
 
@@ -154,7 +154,7 @@ class FaultyBus:
             raise can.CanOperationError("bus off")
 
 
-class FaultyText(ByteLink):
+class FaultyText(ByteStream):
     """Our end of a line of text over the wire, in the place of a descriptor's."""
 
     def __init__(self, wire: FaultyWire) -> None:

@@ -6,6 +6,7 @@ Nothing here ever waits. What a client is too slow to read is lost, whole texts 
 import os
 import socket
 import tty
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
@@ -14,6 +15,7 @@ from mtm_onboard.links.plaintext_messages import PUSH_PORT
 
 _READ_BYTES = 65_536
 _MOST_UNSENT_BYTES = 16_384
+_MOST_EVENT_CLIENTS = 8
 
 
 class Port(Protocol):
@@ -105,9 +107,13 @@ class TcpPort:
     """The network: commands and answers over TCP at `host` and `port`, telemetry by UDP to the client's `push_port`.
 
     One client is served at a time, and the next when it has gone. Port 0 takes a free one, which `port` then tells.
+    With an `event_port` whoever connects there is let in and told nothing, as by a robot that meets no event; clients
+    are known that do not begin without.
     """
 
-    def __init__(self, host: str = "127.0.0.1", port: int = 0, push_port: int = PUSH_PORT) -> None:
+    def __init__(
+        self, host: str = "127.0.0.1", port: int = 0, push_port: int = PUSH_PORT, event_port: int | None = None
+    ) -> None:
         self._listener = socket.create_server((host, port))
         self._listener.setblocking(False)
         self.port: int = self._listener.getsockname()[1]
@@ -118,9 +124,16 @@ class TcpPort:
         self._pushes.setblocking(False)
         self._client: LinePort | None = None
         self._client_host = ""
+        self._events = None if event_port is None else socket.create_server((host, event_port))
+        self._event_clients: deque[socket.socket] = deque()
+        self.event_port = 0
+        if self._events is not None:
+            self._events.setblocking(False)
+            self.event_port = self._events.getsockname()[1]
 
     def receive(self) -> bytes | None:
         """What has arrived; None once when the client has gone."""
+        self._accept_event_client()
         if self._client is None:
             self._client = self._accepted()
         if self._client is None:
@@ -147,6 +160,17 @@ class TcpPort:
             self._client.shutdown()
         self._listener.close()
         self._pushes.close()
+        for connection in (self._events, *self._event_clients):
+            if connection is not None:
+                connection.close()
+
+    def _accept_event_client(self) -> None:
+        if self._events is None:
+            return
+        with suppress(OSError):  # nobody has come
+            self._event_clients.append(self._events.accept()[0])
+            while len(self._event_clients) > _MOST_EVENT_CLIENTS:
+                self._event_clients.popleft().close()
 
     def _accepted(self) -> LinePort | None:
         try:

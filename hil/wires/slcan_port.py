@@ -24,10 +24,12 @@ class SlcanPort:
     """The adapter. The simulator's side is bus-like: `send`, `recv` (which never waits) and `shutdown`.
 
     Frames pass while the other side has the channel open. `lost_frames` counts what it was too slow to read,
-    `refused_lines` what it was answered with a bell.
+    `refused_lines` what it was answered with a bell. An adapter that `rejects` answers each frame so, as one does whose
+    frames nobody on the bus acknowledges.
     """
 
     def __init__(self) -> None:
+        self.rejects = False
         self.lost_frames = 0
         self.refused_lines = 0
         self._ours, self._theirs = os.openpty()
@@ -63,6 +65,11 @@ class SlcanPort:
         if not self._received:
             self._pump()
         return self._received.popleft() if self._received else None
+
+    @property
+    def descriptor(self) -> int:
+        """The simulator's end, readable when the other side has sent something; frames may wait here nevertheless."""
+        return self._ours
 
     def shutdown(self) -> None:
         """Close the line; safe to call more than once."""
@@ -119,7 +126,9 @@ class SlcanPort:
 
     def _take_frame(self, line: bytes) -> bytes:
         match = _FRAME.fullmatch(line)
-        if match is None or len(match[4]) != 2 * int(match[3]) or not self._is_open or self._listens_only:
+        if match is None or len(match[4]) != 2 * int(match[3]) or not self._is_open:
+            return _BELL
+        if self._listens_only or self.rejects:
             return _BELL
         number = int(match[1] or match[2], 16)
         self._received.append(

@@ -14,6 +14,7 @@ from hil.worlds.world import Shot
 from mtm_audit.model.picture import Frame, Image
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.installing import install_command
 
 WIDTH_PX, HEIGHT_PX = lunar_lander.VIEWPORT_W, lunar_lander.VIEWPORT_H
 PX_PER_M = lunar_lander.SCALE
@@ -54,7 +55,8 @@ def rendered(shot: Shot) -> Iterator[Frame]:
         import pygame  # noqa: F401
     except ImportError as error:
         raise MtmError(
-            "Gymnasium draws the Lunar Lander with pygame, which is missing; install it with: pip install 'mtm[worlds]'"
+            "Gymnasium draws the Lunar Lander with pygame, which is missing; install it with: "
+            f"{install_command('worlds')}"
         ) from error
     return _rendered(shot)
 

@@ -5,6 +5,7 @@ from importlib.util import find_spec
 
 from hil.worlds.world import World
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.installing import install_command
 
 # The module and class of each, and the packages of its simulator.
 _MODULES = {
@@ -26,7 +27,7 @@ def make_world(name: str) -> World:
     if missing:
         raise MtmError(
             f"the world {name} needs {' and '.join(packages)}, and {missing[0]} is missing; install it with: "
-            "pip install 'mtm[worlds]'"
+            f"{install_command('worlds')}"
         )
     world: World = getattr(import_module(module), kind)()
     return world

@@ -33,7 +33,14 @@ def fleet_scheme(message_ticks: int = 600) -> Scheme:
     """The paper's scheme for this world, and the key generator's preset `robomaster-fleet`: M = 4, split, sigma 0.1."""
     names = [f"robot{number}" for number in range(ROBOTS)]
     channels = tuple(Channel(name, name, ("vx", "vy"), 1, 0.1) for name in names)
-    return Scheme("robomaster-fleet", 50.0, (0.5, 5.0), 4, message_ticks, channels)
+    return Scheme(
+        name="robomaster-fleet",
+        rate_hz=50.0,
+        band_hz=(0.5, 5.0),
+        alphabet_size=4,
+        message_ticks=message_ticks,
+        channels=channels,
+    )
 
 
 @dataclass(frozen=True)

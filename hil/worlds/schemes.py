@@ -76,6 +76,12 @@ def _scheme(
 ) -> Scheme:
     signal = SIGNALS[world]
     return Scheme(
-        world, signal.rate_hz, signal.band_hz, alphabet_size, message_ticks, channels,
-        combine="same" if same else "split", power=signal.power,
-    )  # fmt: skip
+        name=world,
+        rate_hz=signal.rate_hz,
+        band_hz=signal.band_hz,
+        alphabet_size=alphabet_size,
+        message_ticks=message_ticks,
+        channels=channels,
+        combine="same" if same else "split",
+        power=signal.power,
+    )

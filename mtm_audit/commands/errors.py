@@ -1,9 +1,10 @@
 """How a command ends badly: one sentence on standard error and an exit code, never a traceback."""
 
+import os
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Never
 
 import typer
@@ -20,17 +21,32 @@ def reported(program: str, when_interrupted: str) -> Iterator[None]:
     former = signal.signal(signal.SIGTERM, _terminated)
     try:
         yield
+        # Here, where it can still be told, and not when the interpreter ends.
+        sys.stdout.flush()
     except MtmError as error:
         print(f"{program}: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
+    except BrokenPipeError as error:
+        print(f"{program}: nobody reads the output any more, so its end is lost; let it be read", file=sys.stderr)
+        _discard_output()
+        raise typer.Exit(1) from error
     except OSError as error:
         print(f"{program}: the system refused ({error}); check disk space and permissions", file=sys.stderr)
+        _discard_output()
         raise typer.Exit(1) from error
     except KeyboardInterrupt as error:
         print(f"{program}: interrupted; {when_interrupted}", file=sys.stderr)
         raise typer.Exit(130) from error
     finally:
         signal.signal(signal.SIGTERM, former)
+
+
+def _discard_output() -> None:
+    """Let what is still buffered for standard output go nowhere, where it cannot fail a second time."""
+    with suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
 
 
 def _terminated(*_: object) -> Never:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.input_file import BrokenTextError, read_text
 
 COLUMNS = ("channel", "M", "t", "successes", "trials")
 _POOLED = "+"
@@ -99,11 +100,9 @@ def pooled_name(members: Iterable[str]) -> str:
 def read_table(path: Path) -> AccuracyTable:
     """Read a table; raises MtmError with the line and what it should hold."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [(number, row) for number, row in _numbered(file) if row]
-    except OSError as error:
-        raise MtmError(f"cannot read the accuracy table {path}: {error.strerror}; check the name") from error
-    except (UnicodeDecodeError, csv.Error) as error:
+        text = read_text(path, "the accuracy table").removeprefix("\ufeff")
+        rows = [(number, row) for number, row in _numbered(text.splitlines()) if row]
+    except (BrokenTextError, csv.Error) as error:
         raise MtmError(f"{path} is not a CSV file; give a table such as mtm-hil sweep writes") from error
     if not rows or tuple(cell.strip() for cell in rows[0][1]) != COLUMNS:
         raise MtmError(f"{path} does not begin with the header {','.join(COLUMNS)}; add it or name another file")

@@ -31,10 +31,11 @@ _FLAGS = {
 class JournalSummary:
     """One run in numbers.
 
-    `missed` counts ticks between the first and the last that have no row; `counts` the ticks of each kind;
-    `lateness_s` are the median, the 99th percentile and the greatest. `energy` is the sum of the noise's square times
-    the tick's length on each axis, in m^2/s and rad^2/s; `rms` its root mean square over the ticks with noise, in m/s
-    and rad/s. `saturation` is the share of ticks in which a limit cut something.
+    `ticks` counts rows, those whose command never left included; `missed` counts ticks between the first and the last
+    that have no row, since the loop came too late; `counts` the rows of each kind; `lateness_s` are the median, the
+    99th percentile and the greatest. `energy` is the sum of the noise's square times the tick's length on each axis, in
+    m^2/s and rad^2/s; `rms` its root mean square over the ticks with noise, in m/s and rad/s. `saturation` is the share
+    of ticks in which a limit cut something.
     """
 
     header: JournalHeader
@@ -66,7 +67,8 @@ class JournalSummary:
                 "rate_hz": header.rate_hz,
             },
             "ticks": {
-                "sent": self.ticks, "first": self.first_tick, "last": self.last_tick, "missed": self.missed,
+                "sent": self.ticks - self.counts["unsent"], "missed": self.missed,
+                "first": self.first_tick, "last": self.last_tick,
                 **{name.replace(" ", "_"): count for name, count in self.counts.items()},
             },
             "lateness_s": dict(zip(("p50", "p99", "max"), self.lateness_s, strict=True)),

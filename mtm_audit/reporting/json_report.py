@@ -12,6 +12,7 @@ from mtm_audit.decoding.frames import Delivered
 from mtm_audit.model.recording import Recording
 from mtm_audit.reporting.text import message_bits
 from mtm_audit.significance.decoys import DecoyComparison
+from mtm_onboard.protocol.installing import DISTRIBUTION
 from mtm_onboard.protocol.slots import slot_start_unix_s
 
 SCHEMA_VERSION = 2
@@ -22,7 +23,7 @@ def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, .
     evidence, scheme = decoding.evidence, decoding.scheme
     report = {
         "schema_version": SCHEMA_VERSION,
-        "program": {"name": "mtm-audit", "version": version("mtm")},
+        "program": {"name": "mtm-audit", "version": version(DISTRIBUTION)},
         "verdict": decoding.verdict,
         "message": decoding.message.hex() if isinstance(decoding.message, bytes) else decoding.message,
         "message_bits": message_bits(decoding),

@@ -21,8 +21,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     parser.add_argument(
         "--start-at", type=_seconds, metavar="T",
-        help="the message's start in seconds since the Unix epoch, the same for robots that start together (now); "
-        "under the rolling schedule the first slot from then on",
+        help="the message's start in seconds since the Unix epoch, still to come and the same for robots that start "
+        "together (now); under the rolling schedule the first slot from then on",
     )  # fmt: skip
     parser.add_argument(
         "--stdin", action="store_true", help="base commands from standard input; at its end the robot stands still"
@@ -43,9 +43,15 @@ def _run(args: argparse.Namespace) -> int:
         config = replace(config, source=SourceSettings("stdin"))
     plan = Plan(None if args.no_message else content(args), not args.no_repeat, args.start_at, args.duration)
     with ending_signals() as asked_to_end:
-        outcome = run_session(config, key, plan, asked_to_end)
+        outcome = run_session(config, key, plan, asked_to_end, say=_say)
     print(outcome.summary())
     return 0
+
+
+def _say(sentence: str) -> None:
+    import sys
+
+    print(f"mtm-onboard: {sentence}", file=sys.stderr, flush=True)
 
 
 def _seconds(text: str) -> float:

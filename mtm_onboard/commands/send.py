@@ -25,6 +25,6 @@ def _send(args: argparse.Namespace) -> int:
     start = datetime.fromtimestamp(answer["unix_s"], UTC)
     slot = "" if answer["slot"] is None else f", slot {answer['slot']}"
     instead = "" if answer["replaces"] is None else f", in the place of {called(answer['replaces'])} that was waiting"
-    begins = called("silence" if args.silence else answer["number"])
+    begins = "silence" if args.silence else f"{called(answer['number'])}, {answer['content']},"
     print(f"{begins} begins at {start:%Y-%m-%d %H:%M:%S.%f} UTC ({answer['unix_s']:.6f}){slot}{instead}")
     return 0

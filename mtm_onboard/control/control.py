@@ -8,13 +8,16 @@ Requests and answers are tables, one JSON line each on the control socket:
     {"command": "stop"}
 """
 
+import math
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from mtm_onboard.control.state_log import RunState, named
 from mtm_onboard.journal.journal import Journal
-from mtm_onboard.links.base import Transport
+from mtm_onboard.links.base import Link
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.runtime.guard import Guard
 from mtm_onboard.runtime.loop import LoopStats
@@ -28,12 +31,12 @@ Table = dict[str, Any]
 _PATIENCE_S = 2.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Session:
     """The parts of a run that can be asked or told something.
 
-    `tick` says which one is under way; tick 0 is at `start_unix_s`, and under the rolling schedule slot `first_slot`
-    begins there.
+    Tick 0 is at `start_s` on the runtime's clock, whose time `now_s` says, and at `start_unix_s`; under the rolling
+    schedule slot `first_slot` begins there.
     """
 
     robot: str
@@ -41,12 +44,38 @@ class Session:
     modulator: Modulator
     guard: Guard
     source: Source
-    transport: Transport
+    transport: Link
     stats: LoopStats
     journal: Journal | None
-    tick: Callable[[], int]
+    now_s: Callable[[], float]
+    start_s: float
     start_unix_s: float
     first_slot: int
+
+    @property
+    def tick(self) -> int:
+        """The tick under way."""
+        return math.floor((self.now_s() - self.start_s) * self.key.scheme.rate_hz)
+
+    def state(self) -> RunState:
+        """What an operator wants to know; may be asked from any thread."""
+        guard, source, modulator, now_s = self.guard, self.source, self.modulator, self.now_s()
+        # Only a link that comes back is ever down during a run.
+        link = self.transport if isinstance(self.transport, ReconnectingLink) else None
+        is_up = link is None or link.up_since_s is not None
+        return RunState(
+            stopped_by=source.stop_reason if guard.stopped else "",
+            link_up=is_up,
+            link_fault="" if link is None or is_up else link.fault,
+            link_doubt=self.transport.degraded,
+            command_age_s=guard.age_s(now_s),
+            stale=guard.is_stale(now_s),
+            sender=source.sender,
+            intruder=source.intruder,
+            message=named(modulator.message),
+            waiting=named(modulator.waiting),
+            sends=modulator.sends(self.tick),
+        )
 
 
 class Control:
@@ -75,11 +104,15 @@ class Control:
         content = request.get("content")
         if not isinstance(content, dict):
             raise MtmError("the request has no content; give a number, text, hex or symbols")
+        if self._session.guard.stopped:
+            raise MtmError(
+                "the robot was stopped for good and no message would be seen; look at it, and start its run anew"
+            )
         with self._one_message_at_a_time:
             message = message_of(content_from_table(content), self._session.key, self._messages)
-            answer = self._queue(message, f"message {message.number} begins here, {_words(content)}")
+            answer = self._queue(message, f"message {message.number} begins here, {message.words}")
             self._messages += 1
-        return answer | {"number": message.number}
+        return answer | {"number": message.number, "content": message.words}
 
     def _silence(self, _: Table) -> Table:
         with self._one_message_at_a_time:
@@ -100,34 +133,45 @@ class Control:
         return self._when(tick) | {"replaces": replaced}
 
     def _status(self, _: Table) -> Table:
-        session = self._session
+        session, state = self._session, self._session.state()
         guard, stats, modulator, journal = session.guard, session.stats, session.modulator, session.journal
-        tick = session.tick()
+        age_s = state.command_age_s
         return {
             "robot": session.robot,
+            "state": state.summary,
             "key": session.key.id,
             "scheme": session.key.scheme.fingerprint,
-            "tick": tick,
+            "message": _name(modulator.message),
+            "content": _content(modulator.message),
+            "waiting": _name(modulator.waiting),
+            "waiting_content": _content(modulator.waiting),
+            "silent": not state.sends,
+            "stopped": guard.stopped,
+            "commands": {
+                "arriving": not state.stale,
+                "age_s": round(age_s, 3) if math.isfinite(age_s) else None,
+                "sender": state.sender or None,
+                "of_others": session.source.intrusions,
+                "lost": session.source.lost,
+            },
+            "tick": session.tick,
             "sent": stats.sent,
+            "unsent": stats.unsent,
             "missed": stats.missed,
             "overruns": stats.overruns,
             "clamped": guard.clamped,
             "stale": guard.stale,
             "held": guard.held,
-            "unsent": guard.unsent,
             "refused": session.source.refused + guard.refused,
             "late_p99_ms": round(1e3 * stats.lateness.quantile_s(0.99), 3),
-            "stopped": guard.stopped,
-            "message": _name(modulator.message),
-            "waiting": _name(modulator.waiting),
-            "silent": not modulator.sends(tick),
             "journal_lost": None if journal is None else journal.lost,
-            "link": session.transport.health(),
+            "link": {"up": state.link_up, "fault": state.link_fault or None} | session.transport.health(),
         }
 
     def _stop(self, _: Table) -> Table:
+        self._session.source.stop_reason = "stop over the control socket"
         self._session.guard.stop()
-        self._note(self._session.tick(), "stop over the control socket")
+        self._note(self._session.tick, "stop over the control socket")
         return {"stopped": True}
 
     def _when(self, tick: int) -> Table:
@@ -151,5 +195,6 @@ def _name(played: Played | None) -> int | str | None:
     return None if played is None or isinstance(played, Sequence) else played.number
 
 
-def _words(content: Table) -> str:
-    return ", ".join(f"{kind} {value}" for kind, value in content.items())
+def _content(played: Played | None) -> str | None:
+    """What a message says, in words; None for what says nothing."""
+    return None if played is None or isinstance(played, Silence | Sequence) else played.words

@@ -6,9 +6,7 @@ keeps silent holds up neither the loop nor the operator's stop.
 """
 
 import json
-import os
 import socket
-import stat
 import threading
 import time
 from collections import deque
@@ -18,6 +16,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.runtime.socket_file import SocketFile
 
 Table = dict[str, Any]
 
@@ -39,22 +38,9 @@ class ControlSocket:
     """
 
     def __init__(self, path: Path) -> None:
-        _clear(path)
-        self.path = path
-        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        try:
-            # Before it has a name, so that at no moment anybody else could connect.
-            os.fchmod(self._listener.fileno(), 0o600)
-            self._listener.bind(str(path))
-            os.chmod(path, 0o600)
-            self._identity = _identity(path)
-            self._listener.listen(_BACKLOG)
-        except OSError as error:
-            self._listener.close()
-            reason = error.strerror or error
-            raise MtmError(
-                f"cannot make the control socket {path}: {reason}; choose a short path in a folder that is writable"
-            ) from error
+        self._file = SocketFile(path, socket.SOCK_STREAM, 0o600, "control socket")
+        self._listener = self._file.socket
+        self._listener.listen(_BACKLOG)
         self._listener.settimeout(_POLL_S)
         self._ending = threading.Event()
         self._connections: deque[socket.socket] = deque()
@@ -70,12 +56,9 @@ class ControlSocket:
         self._ending.set()
         if self._thread is not None:
             self._thread.join()
-        self._listener.close()
+        self._file.close()
         for connection in list(self._connections):
             _shut(connection)
-        with suppress(OSError):
-            if _identity(self.path) == self._identity:
-                self.path.unlink()
 
     def __enter__(self) -> Self:
         return self
@@ -171,32 +154,6 @@ def _read_line(connection: socket.socket, deadline_s: float) -> bytes:
             return b""
         data += received
     return data.split(b"\n", 1)[0]
-
-
-def _clear(path: Path) -> None:
-    """Remove a socket that nobody listens at; raises MtmError for anything else that stands at `path`."""
-    try:
-        if not stat.S_ISSOCK(path.lstat().st_mode):
-            raise MtmError(f"{path} is there already and is no socket; choose another path for the control socket")
-        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
-            probe.settimeout(_DEADLINE_S)
-            probe.connect(str(path))
-    except FileNotFoundError:
-        return
-    except ConnectionRefusedError:
-        with suppress(FileNotFoundError):
-            path.unlink()
-        return
-    except OSError as error:
-        raise MtmError(
-            f"cannot tell who has the control socket {path} ({error.strerror or error}); remove it or choose another"
-        ) from error
-    raise MtmError(f"another run listens at the control socket {path}; end it first, or give this one another path")
-
-
-def _identity(path: Path) -> tuple[int, int]:
-    status = path.lstat()
-    return status.st_dev, status.st_ino
 
 
 def _shut(connection: socket.socket) -> None:

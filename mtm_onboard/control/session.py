@@ -6,27 +6,29 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mtm_onboard.control.control import Control, Session
 from mtm_onboard.control.control_socket import ControlSocket
 from mtm_onboard.control.service_manager import ServiceManager
+from mtm_onboard.control.state_log import StateLog, named
 from mtm_onboard.journal.journal import Journal, JournalHeader
-from mtm_onboard.links.base import Transport
-from mtm_onboard.links.factory import make_transport
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.base import Link
+from mtm_onboard.links.factory import make_link
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.model.clock import Clock, SystemClock
 from mtm_onboard.protocol import Key, MtmError, Scheme
 from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.runtime.config import RobotConfig, SourceSettings
+from mtm_onboard.runtime.datagram_source import UdpSource, UnixSource
 from mtm_onboard.runtime.guard import Guard
 from mtm_onboard.runtime.loop import LoopStats, run_loop
-from mtm_onboard.runtime.message import SILENCE, Content, message_of
+from mtm_onboard.runtime.message import SILENCE, Content, Played, message_of
 from mtm_onboard.runtime.modulator import Modulator
 from mtm_onboard.runtime.realtime import realtime
 from mtm_onboard.runtime.service import ServiceThread
-from mtm_onboard.runtime.source import Source, StdinSource, UdpSource
+from mtm_onboard.runtime.source import Source, StdinSource
 from mtm_onboard.runtime.tick import Runtime
 
 # Between opening the link and the message's first tick, so that the loop is running by then.
@@ -50,15 +52,24 @@ class Plan:
     duration_s: float = math.inf
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Ends:
-    """Where base commands come from and where commands go, when the caller has both already."""
+    """Where base commands come from and where commands go, when the caller has both already, and names for them.
+
+    `stop_by` says how the operator stops the robot. `clock` says what the time is for the ticks; `simulated` that it is
+    not this computer's.
+    """
 
     source: Source
-    transport: Transport
+    transport: Link
+    clock: Clock
+    simulated: bool
+    source_name: str
+    link_name: str
+    stop_by: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
     """What the run did. `journal` is None when none was kept."""
 
@@ -67,48 +78,63 @@ class Outcome:
     source: Source
     journal: Journal | None
     link_losses: int = 0
+    link_degradations: int = 0
+    link_counters: dict[str, int] = field(default_factory=dict)
 
     def summary(self) -> str:
         """All of it in one line."""
         guard, late_ms = self.guard, [1e3 * self.stats.lateness.quantile_s(part) for part in (0.5, 0.99)]
         kept = f", journal {self.journal.path}, {self.journal.lost} rows lost" if self.journal else ""
+        counted = [f"{name.replace('_', ' ')} {count}" for name, count in self.link_counters.items() if count]
         return (
-            f"{self.stats.sent} ticks sent, {self.stats.missed} missed, {self.stats.overruns} over their period, "
+            f"{self.stats.sent} ticks sent, {self.stats.unsent} unsent, {self.stats.missed} missed, "
+            f"{self.stats.overruns} over their period, "
             f"{guard.clamped} clamped, {guard.stale} stale, {self.link_losses} link losses, "
-            f"{self.source.refused + guard.refused} commands refused, "
+            f"{self.link_degradations} times degraded, {self.source.refused + guard.refused} commands refused, "
             f"late p50 {late_ms[0]:.3f} ms p99 {late_ms[1]:.3f} ms{kept}"
+            + (f"; the link counted: {', '.join(counted)}" if counted else "")
         )
 
 
 def run_session(
-    config: RobotConfig, key: Key, plan: Plan, asked_to_end: Callable[[], bool], ends: Ends | None = None
+    config: RobotConfig,
+    key: Key,
+    plan: Plan,
+    asked_to_end: Callable[[], bool],
+    ends: Ends | None = None,
+    say: Callable[[str], None] = lambda sentence: None,
 ) -> Outcome:
     """Drive the robot until `asked_to_end()` or the plan's end; leaving it, in whatever way, stops the robot.
 
-    `ends`, when given, take the place of the source and the transport that the configuration names.
-    Raises MtmError when the plan does not fit the key, when the link, the control socket or the journal cannot be had,
-    and when the link fails.
+    `ends`, when given, take the place of the source and the transport that the configuration names. `say` is told at
+    the start what the run is, and from another thread one sentence at each change of its state.
+    Raises MtmError when the plan does not fit the key or starts in the past, when the link, the control socket or the
+    journal cannot be had, and when the link fails.
     """
     channel, rate_hz = key.scheme.channel(config.robot.channel), key.scheme.rate_hz
     rolling = key.scheme.schedule == "rolling"
     # Before anything moves, so that whatever does not fit is found; a rolling message then gets its true slot.
     modulator = _modulator(key, channel.name, plan, 0)
-    if rolling:
-        _check_clock(time.time())
+    clock, stats = SystemClock() if ends is None else ends.clock, LoopStats()
+    unix_s = time.time if ends is None or not ends.simulated else clock.now
+    _check_start(plan, unix_s(), rolling=rolling)
     guard = Guard(config.limits, config.staleness, noise_sigma=channel.sigma, period_s=1 / rate_hz)
-    clock, stats = SystemClock(), LoopStats()
     transport = _link(config, clock) if ends is None else ends.transport
     # The stack closes in reverse: the robot is told to stop before a socket or a slow disk is waited for.
     with ExitStack() as stack:
+        # From the start, so that no heartbeat is late while the rest is made.
+        place_threads = stack.enter_context(realtime(config.realtime, _warn))
         source = _source(config.source) if ends is None else ends.source
         stack.callback(source.close)
         files = stack.enter_context(ExitStack())
+        for sentence in introduction(config, key, modulator.message, ends):
+            say(sentence)
         socket = None if config.control is None else files.enter_context(ControlSocket(Path(config.control.socket)))
         stack.enter_context(transport)
         service = stack.enter_context(ServiceThread(transport, clock))
         # Before the service's thread is waited for, which a wedged driver may hold.
         stack.callback(transport.stop)
-        now_s, now_unix_s = clock.now(), time.time()
+        now_s, now_unix_s = clock.now(), unix_s()
         start_unix_s, first_slot = start_of(plan, key.scheme, now_unix_s)
         if rolling:
             modulator = _modulator(key, channel.name, plan, first_slot)
@@ -118,18 +144,31 @@ def run_session(
             header = JournalHeader(
                 fingerprint=key.scheme.fingerprint, key_id=key.id, robot=config.robot.name, channel=channel.name,
                 symbols=None if plan.message is None else message_of(plan.message, key).symbols(first_slot),
-                repeat=plan.repeat, rate_hz=rate_hz, start_s=start_s, start_unix_s=start_unix_s,
+                repeat=plan.repeat, rate_hz=rate_hz, start_s=start_s,
+                start_unix_s=None if ends is not None and ends.simulated else start_unix_s,
             )  # fmt: skip
             journal = files.enter_context(
                 Journal(Path(config.journal.path), header, threaded=True, max_bytes=int(1e6 * config.journal.max_mb))
             )
         runtime = Runtime(modulator, guard, source, transport, journal)
+        session = Session(
+            robot=config.robot.name,
+            key=key,
+            modulator=modulator,
+            guard=guard,
+            source=source,
+            transport=transport,
+            stats=stats,
+            journal=journal,
+            now_s=clock.now,
+            start_s=start_s,
+            start_unix_s=start_unix_s,
+            first_slot=first_slot,
+        )
         if socket is not None:
-            session = Session(
-                config.robot.name, key, modulator, guard, source, transport, stats, journal,
-                lambda: math.floor((clock.now() - start_s) * rate_hz), start_unix_s, first_slot,
-            )  # fmt: skip
             socket.serve(Control(session).answer)
+        # After the robot was told to stop, as all that may wait.
+        files.enter_context(StateLog(session.state, say))
 
         # Closed first of all: whoever ends takes as long as it takes, and no watchdog is fed any more.
         manager = ServiceManager()
@@ -140,23 +179,32 @@ def run_session(
             manager.feed(now_s)
             return asked_to_end() or service.error is not None or now_s >= start_s + plan.duration_s
 
-        with _long_lived_objects_uncollected(), realtime(config.realtime, _warn):
+        with _long_lived_objects_uncollected():
+            place_threads(service.thread)
             manager.ready()
             run_loop(clock, rate_hz, runtime.step, start_s=start_s, stop=ending, stats=stats)
         if service.error is not None:
             raise MtmError(f"the robot's link failed ({service.error}); check the link") from service.error
-    return Outcome(stats, guard, source, journal, runtime.transport_errors)
+    return Outcome(
+        stats=stats,
+        guard=guard,
+        source=source,
+        journal=journal,
+        link_losses=runtime.link_losses,
+        link_degradations=runtime.link_degradations,
+        link_counters=transport.counters(),
+    )
 
 
 def _warn(text: str) -> None:
     print(f"mtm-onboard: {text}", file=sys.stderr)
 
 
-def _link(config: RobotConfig, clock: Clock) -> Transport:
-    def make() -> Transport:
-        return make_transport(config.transport_kind, config.transport_options)
+def _link(config: RobotConfig, clock: Clock) -> Link:
+    def make() -> Link:
+        return make_link(config.transport_kind, config.transport_options)
 
-    return ReconnectingTransport(make, clock, give_up_s=config.link.give_up_s) if config.link.reconnect else make()
+    return ReconnectingLink(make, clock, give_up_s=config.link.give_up_s) if config.link.reconnect else make()
 
 
 def start_of(plan: Plan, scheme: Scheme, now_unix_s: float) -> tuple[float, int]:
@@ -171,11 +219,36 @@ def start_of(plan: Plan, scheme: Scheme, now_unix_s: float) -> tuple[float, int]
     return slot_start_unix_s(slot, scheme), slot
 
 
-def _check_clock(now_unix_s: float) -> None:
-    if now_unix_s < _EARLIEST_UNIX_S:
+def introduction(config: RobotConfig, key: Key, message: Played, ends: Ends | None) -> Iterator[str]:
+    """What a run says of itself before anything moves."""
+    robot, scheme = config.robot, key.scheme
+    yield (
+        f"{robot.name} plays channel {robot.channel} of scheme {scheme.name} ({scheme.fingerprint}) with key {key.id}: "
+        f"{named(message) or 'no message'}"
+    )
+    options = ", ".join(f"{name} {value}" for name, value in config.transport_options.items())
+    link = f"{config.transport_kind}{f' ({options})' if options else ''}" if ends is None else ends.link_name
+    yield f"base commands come from {config.source if ends is None else ends.source_name} and go to {link}"
+    yield f"to stop the robot: {_ways_to_stop(config) if ends is None else ends.stop_by}; Ctrl-C ends the run"
+
+
+def _ways_to_stop(config: RobotConfig) -> str:
+    where = (
+        "a line stop on standard input" if config.source.kind == "stdin" else f"the datagram stop to {config.source}"
+    )
+    return where if config.control is None else f"mtm-onboard stop --socket {config.control.socket}, or {where}"
+
+
+def _check_start(plan: Plan, now_unix_s: float, *, rolling: bool) -> None:
+    if rolling and now_unix_s < _EARLIEST_UNIX_S:
         raise MtmError(
             "this computer's clock was never set, and the rolling schedule's messages start by the time of day; "
             "set the clock, for example by NTP"
+        )
+    if plan.start_unix_s is not None and plan.start_unix_s <= now_unix_s:
+        raise MtmError(
+            f"the start is {now_unix_s - plan.start_unix_s:.3f} s in the past; give a time that is still to come, in "
+            f"seconds since the Unix epoch (now is {now_unix_s:.0f})"
         )
 
 
@@ -187,6 +260,8 @@ def _modulator(key: Key, channel_name: str, plan: Plan, first_slot: int) -> Modu
 
 
 def _source(settings: SourceSettings) -> Source:
+    if settings.socket is not None:
+        return UnixSource(Path(settings.socket))
     return StdinSource() if settings.port is None else UdpSource(settings.port)
 
 

@@ -77,7 +77,7 @@ def check_loop(settings: RealtimeSettings, scheme: Scheme, duration_s: float) ->
     with realtime(settings, refused.append):
         start_s = clock.now() + _LEAD_S
         run_loop(
-            clock, scheme.rate_hz, lambda tick, now_s: None, start_s=start_s, stats=stats,
+            clock, scheme.rate_hz, lambda tick, now_s, late_s: None, start_s=start_s, stats=stats,
             stop=lambda: clock.now() >= start_s + duration_s,
         )  # fmt: skip
     return [_realtime_finding(settings, refused), lateness_finding(stats, scheme)]

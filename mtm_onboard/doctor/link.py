@@ -11,8 +11,9 @@ from importlib.util import find_spec
 
 from mtm_onboard.doctor.can_interface import check_interface
 from mtm_onboard.doctor.finding import Finding
-from mtm_onboard.links.factory import make_transport
+from mtm_onboard.links.factory import make_link
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.installing import install_command
 from mtm_onboard.runtime.config import Option
 
 Options = dict[str, Option]
@@ -26,7 +27,7 @@ _VIRTUAL_CAN = ("virtual", "udp_multicast")
 def check_link(kind: str, options: Options) -> Finding:
     """Check what this kind of transport needs; the options are checked by making the transport without opening it."""
     try:
-        make_transport(kind, options)
+        make_link(kind, options)
         return _CHECKS[kind](options)
     except MtmError as error:
         return Finding("link", "fail", str(error))
@@ -37,7 +38,7 @@ def check_link(kind: str, options: Options) -> Finding:
 def check_serial(path: str) -> Finding:
     """Check that this user may open the serial device and that no other program holds it."""
     if find_spec("serial") is None:
-        return Finding("link", "fail", "pyserial is not installed; install mtm[serial] or python3-serial")
+        return Finding("link", "fail", f"pyserial is not installed; run {install_command('serial')}")
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     except OSError as error:
@@ -100,7 +101,7 @@ def _check_can(options: Options) -> Finding:
     from mtm_onboard.links.robomaster_messages import BITRATE
 
     if find_spec("can") is None:
-        return Finding("link", "fail", "python-can is not installed; install mtm[can] or python3-can")
+        return Finding("link", "fail", f"python-can is not installed; run {install_command('can')}")
     bitrate = options.get("bitrate", BITRATE)
     if bitrate != BITRATE:
         return Finding("link", "fail", f"[transport] bitrate is {bitrate}; the robot's is {BITRATE}, so correct it")
@@ -133,7 +134,7 @@ def _check_robomaster_tcp(options: Options) -> Finding:
 
 def _check_mavlink(options: Options) -> Finding:
     if find_spec("pymavlink") is None:
-        return Finding("link", "fail", "pymavlink is not installed; install mtm[mavlink]")
+        return Finding("link", "fail", f"pymavlink is not installed; run {install_command('mavlink')}")
     endpoint = str(options["endpoint"])
     kind, colon, rest = endpoint.partition(":")
     if not colon:

@@ -1,4 +1,4 @@
-"""The files and sockets of a run: the key, the journal, the control socket, the base commands' port."""
+"""The files and sockets of a run: the key, the journal, the control socket, where base commands come from."""
 
 import os
 import pwd
@@ -11,7 +11,7 @@ from mtm_onboard.control.control_socket import ControlSocket
 from mtm_onboard.doctor.finding import Finding
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.runtime.config import ControlSettings, JournalSettings, SourceSettings
-from mtm_onboard.runtime.source import UdpSource
+from mtm_onboard.runtime.datagram_source import UdpSource, UnixSource
 
 # Where systemd makes a service's folder when it starts it.
 _RUNTIME_FOLDERS = Path("/run")
@@ -67,12 +67,8 @@ def check_control(settings: ControlSettings | None) -> Finding:
     if settings is None:
         return Finding("control", "pass", "no control socket, as the configuration says")
     path = Path(settings.socket)
-    if path.is_relative_to(_RUNTIME_FOLDERS) and not path.parent.exists():
-        return Finding(
-            "control", "warn",
-            f"{path.parent} is not there yet; mtm-onboard@.service makes its own, {_RUNTIME_FOLDERS}/mtm, when it "
-            "starts, and any other folder is yours to make",
-        )  # fmt: skip
+    if missing := _missing_runtime_folder("control", path):
+        return missing
     try:
         ControlSocket(path).close()
     except MtmError as error:
@@ -81,14 +77,28 @@ def check_control(settings: ControlSettings | None) -> Finding:
 
 
 def check_source(settings: SourceSettings) -> Finding:
-    """The base commands' port is free."""
-    if settings.port is None:
-        return Finding("source", "pass", "base commands from standard input")
+    """The base commands' socket can be made, or their port is free."""
+    path, port = settings.socket, settings.port
+    if path is not None and (missing := _missing_runtime_folder("source", Path(path))):
+        return missing
     try:
-        UdpSource(settings.port).close()
+        if path is not None:
+            UnixSource(Path(path)).close()
+        if port is not None:
+            UdpSource(port).close()
     except MtmError as error:
         return Finding("source", "fail", f"{error}, or end the run that listens there")
-    return Finding("source", "pass", f"UDP port {settings.port} is free for base commands")
+    return Finding("source", "pass", f"base commands can come from {settings}")
+
+
+def _missing_runtime_folder(name: str, path: Path) -> Finding | None:
+    if not path.is_relative_to(_RUNTIME_FOLDERS) or path.parent.exists():
+        return None
+    return Finding(
+        name, "warn",
+        f"{path.parent} is not there yet; mtm-onboard@.service makes its own, {_RUNTIME_FOLDERS}/mtm, when it "
+        "starts, and any other folder is yours to make",
+    )  # fmt: skip
 
 
 def _user(number: int) -> str:

@@ -38,7 +38,7 @@ _MAX_MESSAGE_TICKS = 1 << 20
 _RATES_MHZ = (1000, 1_000_000)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Image:
     """Samples (axes played, ticks), int16, of `messages` messages from number `first_message` on.
 
@@ -137,9 +137,18 @@ def parse_image(data: bytes) -> Image:
     if not 1 <= axes <= 7 or flags > 1 or samples.size != rows * message_ticks * messages:
         raise MtmError("the image's fields contradict each other; export it again")
     return Image(
-        rate_mhz, message_ticks, messages, first_message, epoch, fingerprint.hex(), bool(flags), steps, limits,
-        samples.astype(np.int16).reshape(rows, -1), fields[17],
-    )  # fmt: skip
+        rate_mhz=rate_mhz,
+        message_ticks=message_ticks,
+        messages=messages,
+        first_message=first_message,
+        epoch=epoch,
+        fingerprint=fingerprint.hex(),
+        repeats=bool(flags),
+        steps=steps,
+        limits_q20=limits,
+        samples=samples.astype(np.int16).reshape(rows, -1),
+        tag=fields[17],
+    )
 
 
 def tagged(image: Image, secret: bytes) -> Image:

@@ -38,7 +38,7 @@ _SYNC_PERIOD_S = 0.8  # with the writing period before it, within a second
 # Events that each new segment repeats, so that the oldest segment may go without them.
 _REPEATED_EVENTS = 50
 _LONGEST_EVENT = 500  # characters
-_Row = tuple[int, float, BodyVelocity, BodyVelocity, int]
+_Row = tuple[int, float, BodyVelocity, BodyVelocity, int, float]
 
 
 class Journal:
@@ -73,9 +73,14 @@ class Journal:
         """Rows and events that found the queue full or could not be written."""
         return self._overrun + self._unwritten
 
-    def append(self, tick: int, now_s: float, base: BodyVelocity, sent: BodyVelocity, flags: int) -> None:
-        """Keep one tick for writing; a row that finds the queue full is lost and counted."""
-        self._keep((tick, now_s, base, sent, flags))
+    def append(
+        self, tick: int, now_s: float, base: BodyVelocity, sent: BodyVelocity, flags: int, late_s: float
+    ) -> None:
+        """Keep one tick for writing; a row that finds the queue full is lost and counted.
+
+        `late_s` is from the instant that the loop waited for to `now_s`, with the ticks that it missed in between.
+        """
+        self._keep((tick, now_s, base, sent, flags, late_s))
 
     def note(self, tick: int, text: str) -> None:
         """Keep an event for writing, as `append` keeps a tick; may be called from any thread."""
@@ -125,10 +130,9 @@ class Journal:
         if isinstance(entry, Event):
             self._recent.append(entry)
             return event_line(entry)
-        tick, now_s, base, sent, flags = entry
-        lateness_s = now_s - self._header.start_s - tick / self._header.rate_hz
+        tick, now_s, base, sent, flags, late_s = entry
         speeds = ",".join(f"{value:.9g}" for value in (*base, *sent))
-        return f"{tick},{now_s:.6f},{speeds},{lateness_s:.6f},{flags}\n".encode()
+        return f"{tick},{now_s:.6f},{speeds},{late_s:.6f},{flags}\n".encode()
 
     def _write(self, text: bytes) -> None:
         if self._size and self._size + len(text) > self._segment_bytes and not self._rotate():

@@ -1,1 +1,1 @@
-"""Robot links, one a file, all behind `base.Transport`."""
+"""Robot links, one a file, all behind `base.Link`."""

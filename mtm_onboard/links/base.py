@@ -1,6 +1,5 @@
 """The seam between the runtime and a robot: one body velocity out, and always a stop at the end."""
 
-import math
 from abc import ABC, abstractmethod
 from types import TracebackType
 from typing import Self
@@ -10,14 +9,19 @@ from mtm_onboard.protocol.errors import MtmError
 
 
 class LinkBusyError(MtmError):
-    """The far end took a command not at all, or not whole, within the write bound; the link may still be sound."""
+    """The far end took a command not at all, or not whole, within the write bound; the link may still be sound.
+
+    `has_begun` says of a command in a stream that its first bytes have left and the others will, before the next one.
+    """
+
+    has_begun: bool = False
 
 
 class TakenOverError(MtmError):
     """Somebody else, such as a pilot, has taken the robot over; whoever meets this must not open the link anew."""
 
 
-class Transport(ABC):
+class Link(ABC):
     """A link to one robot. As a context manager it opens the link, and leaving it always sends stop and closes.
 
     A subclass implements `open`, `send`, `stop` and `close`. `send` refuses non-finite velocities with ValueError
@@ -26,17 +30,14 @@ class Transport(ABC):
     whole messages with a lock. `write_bound_s` is the longest that `send` may wait for the far end. `has_deadman` says
     whether the robot stops by itself when no commands come; one that does not goes on until the link is back.
 
-    For a link that may go and come back: `up_since_s` is when it came up last on the runtime's clock (-inf for a link
-    that is up from `open` to `stop`, None while it is down), `dropped` counts commands that `send` took without an
-    error and that never left, and `fault` says why the link went down.
+    A link that has reason to doubt that it is obeyed says why in `degraded`, which is empty otherwise; one that knows
+    it is not raises from `send`. Opening it anew is not its own affair, see `reconnecting`.
     """
 
     service_period_s: float = 0.010
     write_bound_s: float = 0.005
     has_deadman: bool = True
-    up_since_s: float | None = -math.inf
-    dropped: int = 0
-    fault: str = ""
+    degraded: str = ""
 
     @abstractmethod
     def open(self) -> None:
@@ -64,9 +65,13 @@ class Transport(ABC):
     def service(self, now_s: float) -> None:  # noqa: B027 - most links need nothing between commands
         """Do what is due at `now_s` (seconds of the runtime's clock)."""
 
-    def health(self) -> dict[str, int | float | str | bool]:
-        """Counters and states of the link by name, for reports; empty when the link keeps none."""
+    def counters(self) -> dict[str, int]:
+        """What was counted since the link was made, by name, for reports; empty when it counts nothing."""
         return {}
+
+    def health(self) -> dict[str, int | float | str | bool]:
+        """The counters and, beside them, states of the link by name, for reports."""
+        return {**self.counters()}
 
     def __enter__(self) -> Self:
         self.open()

@@ -3,11 +3,13 @@
 import errno
 import select
 import time
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from mtm_onboard.links.base import LinkBusyError
+from mtm_onboard.links.can_bus import Bus
 from mtm_onboard.links.duml import Message, Parser, encode, segment
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.installing import install_command
 
 if TYPE_CHECKING:
     import can
@@ -17,40 +19,29 @@ _SHORTEST_TIMEOUT_S = 0.001
 _MOST_FRAMES_A_READ = 512  # so that a babbling bus cannot hold its reader for ever
 
 
-class Bus(Protocol):
-    """What is used of a python-can bus."""
-
-    def send(self, msg: "can.Message", timeout: float | None = None) -> None:
-        """Put one frame on the bus."""
-        ...
-
-    def recv(self, timeout: float | None = None) -> "can.Message | None":
-        """The next frame, None when there is none within `timeout` seconds."""
-        ...
-
-    def shutdown(self) -> None:
-        """Release the bus."""
-        ...
-
-
 class CanStream:
     """Writes messages under one 11-bit id of `bus` and reads those that arrive under another.
 
     Raises MtmError when python-can is missing. Writing from several threads needs a lock around whole messages.
+    `error_frames` counts what the bus's controller said of errors on it.
     """
 
     def __init__(self, bus: Bus, send_id: int, receive_id: int) -> None:
         try:
             import can
         except ImportError:
-            raise MtmError("python-can is not installed; install mtm[can] to reach a robot over CAN.") from None
+            raise MtmError(
+                f"CAN needs python-can, which is not installed; install it with: {install_command('can')}"
+            ) from None
         self.parser = Parser()
+        self.error_frames = 0
         self._bus = bus
         self._send_id = send_id
         self._receive_id = receive_id
         self._frame = can.Message
         self._errors = (can.CanError, OSError, ValueError)  # ValueError: the descriptor of a closed bus
         self._descriptor = _descriptor(bus)
+        self._reads_ahead = hasattr(bus, "has_waiting")
 
     def write(self, message: Message, within_s: float = _WRITE_WITHIN_S) -> None:
         """Put one message on the bus, in `within_s` seconds at most.
@@ -78,11 +69,19 @@ class CanStream:
                 if frame is None:
                     if self._descriptor is None:
                         break
-                elif frame.arbitration_id == self._receive_id and not (frame.is_extended_id or frame.is_error_frame):
+                elif frame.is_error_frame:
+                    self.error_frames += 1
+                elif frame.arbitration_id == self._receive_id and not frame.is_extended_id:
                     data += frame.data
         except self._errors as error:
             raise MtmError(f"The CAN bus cannot be read ({error}); check the wiring and the robot's power.") from error
         return self.parser.feed(data)
+
+    @property
+    def adapter_answers(self) -> tuple[int, int]:
+        """How many frames the adapter said that it rejected, and that it took; zeros where it says nothing."""
+        answers = getattr(self._bus, "answers", None)
+        return (0, 0) if answers is None else (answers.rejected, answers.took)
 
     def shutdown(self) -> None:
         """Release the bus, also one that is gone."""
@@ -107,11 +106,13 @@ class CanStream:
         self._bus.send(frame, timeout=0)
 
     def _is_quiet(self) -> bool:
-        """Whether nothing waits behind the bus's file descriptor; False when it has none.
+        """Whether nothing waits behind the bus's file descriptor, nor in the bus; False when it has no descriptor.
 
         A serial adapter's `recv(0)` waits a millisecond when there is nothing, and gives None for an adapter's own
         reply although frames wait behind it. The descriptor knows better.
         """
+        if self._reads_ahead and self._bus.has_waiting:  # type: ignore[attr-defined]
+            return False
         return self._descriptor is not None and not select.select([self._descriptor], (), (), 0)[0]
 
 

@@ -25,7 +25,7 @@ _FIELDS = struct.Struct("<BBHBBB")
 _CHECKSUM = struct.Struct("<H")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Message:
     """One message. `sender` and `receiver` are host bytes, `attributes` holds the acknowledgement bits."""
 
@@ -39,7 +39,15 @@ class Message:
 
     def answer(self, payload: bytes) -> "Message":
         """The acknowledgement of this message: hosts swapped, everything else but the payload kept."""
-        return Message(self.receiver, self.sender, self.sequence, ACK, self.cmdset, self.cmdid, payload)
+        return Message(
+            sender=self.receiver,
+            receiver=self.sender,
+            sequence=self.sequence,
+            attributes=ACK,
+            cmdset=self.cmdset,
+            cmdid=self.cmdid,
+            payload=payload,
+        )
 
 
 def _crc8_table() -> bytes:
@@ -161,7 +169,15 @@ class Parser:
         sender, receiver, sequence, attributes, cmdset, cmdid = _FIELDS.unpack_from(buffer, _HEADER_BYTES)
         payload = bytes(buffer[_HEADER_BYTES + _FIELDS.size : length - _CHECKSUM.size])
         del buffer[:length]
-        return Message(sender, receiver, sequence, attributes, cmdset, cmdid, payload)
+        return Message(
+            sender=sender,
+            receiver=receiver,
+            sequence=sequence,
+            attributes=attributes,
+            cmdset=cmdset,
+            cmdid=cmdid,
+            payload=payload,
+        )
 
     def _drop(self, count: int) -> None:
         self.dropped_bytes += count

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from mtm_onboard.links.base import TakenOverError, Transport
+from mtm_onboard.links.base import Link, LinkBusyError, TakenOverError
 from mtm_onboard.links.mavlink_codec import MavlinkCodec
 from mtm_onboard.links.mavlink_messages import (
     COMPANION_COMPONENT,
@@ -27,6 +27,7 @@ from mtm_onboard.protocol.errors import MtmError
 HEARTBEAT_PERIOD_S: Final = 1.0
 # Vehicles say once a second in which mode they are; after three missed ones nobody knows who flies.
 HEARTBEAT_LOST_S: Final = 3.5
+HEARTBEAT_LATE_S: Final = 1.5
 
 _STEP_S = 0.02  # between looks at the vehicle, and between set-points, while opening
 _REQUEST_PERIOD_S = 1.0
@@ -37,7 +38,7 @@ _MOST_READS = 64  # so that a babbling line cannot hold its reader for ever
 _BEAT_SLACK = 1e-6
 
 
-class MavlinkTransport(Transport):
+class MavlinkLink(Link):
     """One vehicle of the kind `profile` (rover, copter or px4) at `endpoint`, see `mavlink_ports.port_opener`.
 
     The pilot comes first. `open` refuses until the vehicle is in GUIDED (PX4: OFFBOARD) and armed; only with
@@ -45,6 +46,8 @@ class MavlinkTransport(Transport):
     mode or disarms while it is driven has been taken over: from then on nothing but heartbeats is sent, `send` raises
     TakenOverError, and only `open` begins anew. The vehicle is never disarmed, and never taken off or landed: `stop`
     sends zero velocity, and the vehicle's own time-out (ArduPilot 3 s, PX4's COM_OF_LOSS_T 1 s) does the rest.
+
+    A vehicle whose heartbeat is late leaves the link degraded, and one that was not heard for 3.5 s is lost.
 
     With `signing_key_file` messages are signed both ways. `clock` must be the one whose time `service` is given, and
     `open_port` may take the place of the endpoint.
@@ -92,17 +95,23 @@ class MavlinkTransport(Transport):
         """The vehicle's newest estimate of its motion; None before the first."""
         return self._vehicle.telemetry
 
+    def counters(self) -> dict[str, int]:
+        """What was sent and heard, what the vehicle refused or warned of, and what went wrong on the link."""
+        vehicle, codec = self._vehicle, self._codec
+        return {
+            "heartbeats_sent": self.heartbeats, "heartbeats_heard": vehicle.heartbeats, "setpoints": self.setpoints,
+            "refusals": vehicle.refusals, "alarms": vehicle.alarms, "link_errors": self.link_errors,
+            "bad_frames": codec.bad_frames, "refused_signatures": codec.refused_signatures,
+            "malformed": vehicle.malformed,
+        }  # fmt: skip
+
     def health(self) -> dict[str, int | float | str | bool]:
         """Who is in charge, what the vehicle said, and what went wrong on the link."""
-        vehicle, codec = self._vehicle, self._codec
+        vehicle = self._vehicle
         return {
             "engaged": self._is_engaged and not vehicle.was_taken, "taken_over": vehicle.was_taken,
             "mode": vehicle.mode, "armed": vehicle.is_armed,
-            "heartbeats_sent": self.heartbeats, "heartbeats_heard": vehicle.heartbeats, "setpoints": self.setpoints,
-            "refusals": vehicle.refusals, "last_refusal": vehicle.last_refusal,
-            "alarms": vehicle.alarms, "last_alarm": vehicle.last_alarm,
-            "link_errors": self.link_errors, "bad_frames": codec.bad_frames,
-            "refused_signatures": codec.refused_signatures, "malformed": vehicle.malformed,
+            "last_refusal": vehicle.last_refusal, "last_alarm": vehicle.last_alarm, **self.counters(),
         }  # fmt: skip
 
     def open(self) -> None:
@@ -146,7 +155,11 @@ class MavlinkTransport(Transport):
         """
         setpoint = self._setpoint(velocity)
         self._require_command(self._clock.now())
-        self._write(setpoint)
+        try:
+            self._write(setpoint)
+        except LinkBusyError as error:
+            if not error.has_begun:  # what has begun to leave is finished before the next one, and so was sent
+                raise
         self.setpoints += 1
 
     def stop(self) -> None:
@@ -192,6 +205,9 @@ class MavlinkTransport(Transport):
             except MtmError:
                 pass  # counted, and the next send will meet it too
         self._read(now_s)
+        heard_s = self._vehicle.heard_s
+        is_late = self._is_engaged and heard_s is not None and now_s - heard_s > HEARTBEAT_LATE_S
+        self.degraded = "the vehicle's heartbeat is late" if is_late else ""
 
     def _wait_until_ready(self) -> None:
         clock = self._clock

@@ -5,6 +5,7 @@ from typing import Any
 
 from mtm_onboard.links.mavlink_signing import signing_timestamp
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.installing import install_command
 
 
 def dialect() -> Any:
@@ -12,7 +13,9 @@ def dialect() -> Any:
     try:
         from pymavlink.dialects.v20 import common
     except ImportError:
-        raise MtmError("pymavlink is not installed; install mtm[mavlink] to reach a vehicle over MAVLink.") from None
+        raise MtmError(
+            f"MAVLink needs pymavlink, which is not installed; install it with: {install_command('mavlink')}"
+        ) from None
     return common
 
 

@@ -26,7 +26,7 @@ _MOST_SINGLE = 3.4028234e38
 _BOOT_MS_WRAP = 1 << 32
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class VehicleTelemetry:
     """The vehicle's own estimate in REP-103 signs, from its newest attitude and position.
 

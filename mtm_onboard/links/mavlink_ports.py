@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from mtm_onboard.links.base import LinkBusyError
-from mtm_onboard.links.byte_link import ByteLink, serial_link, tcp_link
+from mtm_onboard.links.byte_stream import ByteStream, serial_stream, tcp_stream
 from mtm_onboard.protocol.errors import MtmError
 
 _MOST_BYTES = 4096
@@ -38,7 +38,7 @@ class Port(Protocol):
 class StreamPort:
     """A serial line or a TCP connection, which has one other end."""
 
-    def __init__(self, link: ByteLink, write_bound_s: float) -> None:
+    def __init__(self, link: ByteStream, write_bound_s: float) -> None:
         self._link = link
         self._write_bound_s = write_bound_s
 
@@ -125,7 +125,7 @@ def port_opener(endpoint: str, baud: int, write_bound_s: float) -> Callable[[], 
     """
     kind, colon, rest = endpoint.partition(":")
     if endpoint and not colon:
-        return lambda: StreamPort(serial_link(endpoint, baud), write_bound_s)
+        return lambda: StreamPort(serial_stream(endpoint, baud), write_bound_s)
     host, _, number = rest.rpartition(":")
     if kind not in ("udpin", "udpout", "tcp") or not host or not (number.isdecimal() and 0 < int(number) < 65_536):
         raise MtmError(
@@ -134,7 +134,7 @@ def port_opener(endpoint: str, baud: int, write_bound_s: float) -> Callable[[], 
         )
     address = host, int(number)
     if kind == "tcp":
-        return lambda: StreamPort(tcp_link(*address), write_bound_s)
+        return lambda: StreamPort(tcp_stream(*address), write_bound_s)
     if kind == "udpin":
         return lambda: UdpPort(listen=address)
     return lambda: UdpPort(peer=address)

@@ -28,7 +28,7 @@ _MULTIROTORS = frozenset({2, 3, 4, 13, 14, 15, 29, 35})  # MAV_TYPE: quadrotor, 
 _GROUND_VEHICLES = frozenset({10, 11})  # MAV_TYPE: ground rover, surface boat
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Profile:
     """One kind of vehicle.
 

@@ -2,12 +2,12 @@
 
 import os
 import re
-import stat
 import time
 from pathlib import Path
 from typing import Final
 
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.input_file import opened
 
 KEY_BYTES: Final = 32
 
@@ -18,12 +18,8 @@ _UNITS_PER_S: Final = 100_000
 
 def load_signing_key(path: Path) -> bytes:
     """Read the key; raises MtmError, which never shows what the file holds."""
-    try:
-        with path.open("rb") as file:
-            mode = os.fstat(file.fileno()).st_mode
-            text = file.read(4 * KEY_BYTES) if stat.S_ISREG(mode) else b""
-    except OSError as error:
-        raise MtmError(f"cannot read the signing key {path}: {error.strerror}; check the name") from error
+    with opened(path, "the signing key") as file:
+        mode, text = os.fstat(file.fileno()).st_mode, file.read(4 * KEY_BYTES)
     if mode & 0o077:
         raise MtmError(f"the signing key {path} can be read by others (mode {mode & 0o777:04o}); run: chmod 600 {path}")
     if not re.fullmatch(rb"\s*[0-9a-fA-F]{%d}\s*" % (2 * KEY_BYTES), text):

@@ -1,10 +1,10 @@
 """A link to no robot, for dry runs."""
 
-from mtm_onboard.links.base import Transport
+from mtm_onboard.links.base import Link
 from mtm_onboard.model.velocity import BodyVelocity
 
 
-class NullTransport(Transport):
+class NullLink(Link):
     """Counts the commands `sent` and the `stops`, and does nothing else."""
 
     def __init__(self) -> None:

@@ -5,7 +5,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from mtm_onboard.links.base import LinkBusyError, TakenOverError, Transport
+from mtm_onboard.links.base import Link, LinkBusyError, TakenOverError
 from mtm_onboard.model.clock import Clock
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
@@ -21,7 +21,7 @@ _LONGEST_PERIOD_S = 0.05
 _SETTLED_S = 5.0
 
 
-class ReconnectingTransport(Transport):
+class ReconnectingLink(Link):
     """One robot's link, made anew by `make` after it failed; `clock` is the runtime's.
 
     A `send` or `service` that fails takes the link down, as do several `LinkBusyError` in a row. While it is down,
@@ -31,20 +31,24 @@ class ReconnectingTransport(Transport):
     `send` raises MtmError. A robot that somebody else has taken over is no lost link: TakenOverError goes to whoever
     called.
 
-    That nothing moves before a base command has come over the new link is the runtime's part, see `up_since_s`.
+    `up_since_s` is when the link came up last on the runtime's clock, -inf for the first and None while it is down;
+    that nothing moves before a base command has come over the new link is the runtime's part. `dropped` counts commands
+    that `send` took without an error and that never left, `losses` outages, and `fault` says why the link went down.
+    Counters are those of all links that were in use, one after the other.
     """
 
-    def __init__(self, make: Callable[[], Transport], clock: Clock, *, give_up_s: float = math.inf) -> None:
+    def __init__(self, make: Callable[[], Link], clock: Clock, *, give_up_s: float = math.inf) -> None:
         self.dropped = 0
         self.losses = 0
         self.fault = ""
-        self.up_since_s = -math.inf
+        self.up_since_s: float | None = -math.inf
         self._make = make
         self._clock = clock
         self._give_up_s = give_up_s
         self._lock = threading.Lock()
-        self._link: Transport | None = make()
+        self._link: Link | None = make()
         self._engaged = False
+        self._counted_before: dict[str, int] = {}
         self._told_to_stop = True
         self._busy = 0
         self._out_since_s = self._next_try_s = 0.0
@@ -53,14 +57,30 @@ class ReconnectingTransport(Transport):
         self.write_bound_s = self._link.write_bound_s
         self.has_deadman = self._link.has_deadman
 
-    def health(self) -> dict[str, int | float | str | bool]:
-        """Of this wrapper and, beside it, of the link in use."""
+    @property
+    def degraded(self) -> str:  # type: ignore[override]
+        """What the link in use says of itself; empty while none is."""
         link = self._link
-        own = {"link_up": self.up_since_s is not None, "link_losses": self.losses, "dropped": self.dropped}
-        return own | ({} if link is None else link.health())
+        return "" if link is None or self.up_since_s is None else link.degraded
+
+    def counters(self) -> dict[str, int]:
+        """Of this wrapper and, beside them, of all links that it has used."""
+        link = self._link
+        counted = dict(self._counted_before)
+        for name, count in ({} if link is None else link.counters()).items():
+            counted[name] = counted.get(name, 0) + count
+        return {"link_losses": self.losses, "dropped": self.dropped, **counted}
+
+    def health(self) -> dict[str, int | float | str | bool]:
+        """The counters, whether the link is up, degraded or down and why, and the states of the link in use."""
+        link = self._link
+        states = {} if link is None else link.health()
+        is_up, doubt = self.up_since_s is not None, self.degraded
+        own = {"link_up": is_up, "link_state": "degraded" if doubt else "up" if is_up else "down"}
+        return own | {"link_trouble": doubt or self.fault} | states | self.counters()
 
     @property
-    def link(self) -> Transport | None:
+    def link(self) -> Link | None:
         """The link in use, or the one that was lost until it is released."""
         return self._link
 
@@ -148,7 +168,7 @@ class ReconnectingTransport(Transport):
         elif self._engaged and now_s >= self._next_try_s:
             self._reopen()
 
-    def _lose(self, link: Transport, error: Exception) -> None:
+    def _lose(self, link: Link, error: Exception) -> None:
         with self._lock:
             if link is not self._link or self.up_since_s is None:
                 return
@@ -164,7 +184,7 @@ class ReconnectingTransport(Transport):
             self._next_try_s = now_s + self._pause_s
             self.up_since_s = None
 
-    def _release(self, link: Transport) -> None:
+    def _release(self, link: Link) -> None:
         told = False
         # A lost link carries the stop no farther than it can; the robot's own deadman is what remains.
         with suppress(Exception):
@@ -173,11 +193,16 @@ class ReconnectingTransport(Transport):
         with suppress(Exception):
             link.close()
         with self._lock:
+            # Before the link goes, so that nobody who asks meanwhile finds less than a moment ago.
+            self._counted_before = {
+                name: count for name, count in self.counters().items() if name not in ("link_losses", "dropped")
+            }
             self._link = None
             self._told_to_stop = told
 
     def _reopen(self) -> None:
         link = None
+        self._next_try_s = math.inf  # not again from within, where a link that waits has its clock call whom it serves
         try:
             link = self._make()
             link.resume()

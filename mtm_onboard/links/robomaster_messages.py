@@ -40,7 +40,15 @@ class Kind:
 
     def message(self, sequence: int, payload: bytes) -> Message:
         """One message of this kind."""
-        return Message(self.sender, self.receiver, sequence, self.attributes, self.cmdset, self.cmdid, payload)
+        return Message(
+            sender=self.sender,
+            receiver=self.receiver,
+            sequence=sequence,
+            attributes=self.attributes,
+            cmdset=self.cmdset,
+            cmdid=self.cmdid,
+            payload=payload,
+        )
 
     def matches(self, message: Message) -> bool:
         """Whether `message` has this kind's command, whoever sent it."""

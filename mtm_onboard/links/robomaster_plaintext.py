@@ -6,8 +6,8 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Final
 
-from mtm_onboard.links.base import Transport
-from mtm_onboard.links.byte_link import ByteLink
+from mtm_onboard.links.base import Link, LinkBusyError
+from mtm_onboard.links.byte_stream import ByteStream
 from mtm_onboard.links.plaintext_messages import (
     ENTER,
     FREE_MODE,
@@ -28,6 +28,8 @@ from mtm_onboard.protocol.errors import MtmError
 
 # A second's commands at 50 Hz. The robot queues 512 of them, and one that is obeyed late is worse than none.
 MOST_UNANSWERED: Final = 50
+# A fifth of a second's: a robot that answers at all does so sooner.
+MANY_UNANSWERED: Final = 10
 
 _STOP_TRIES = 5
 _STOP_TRY_WITHIN_S = 0.03
@@ -46,13 +48,13 @@ class PlaintextTelemetry:
     heading_rad: float | None
 
 
-class RoboMasterPlaintext(Transport):
+class RoboMasterPlaintext(Link):
     """One RoboMaster EP in SDK mode. `open` does not wait for the robot's answers; `service` reads them.
 
     The robot answers every command. When the last `MOST_UNANSWERED` are without an answer (it is off, it lags behind,
     or it obeys another link: the first to enter SDK mode wins, and others meet silence) the link counts as down, as it
     does when the robot says that it is not in SDK mode. The robot has no deadman: it keeps the last speed until the
-    next one, `quit`, or the end of a TCP connection.
+    next one, `quit`, or the end of a TCP connection. Well before that, at `MANY_UNANSWERED`, it is degraded.
 
     `answers` counts commands that were obeyed, `refusals` those that were not, `malformed` texts that nobody could
     have meant, `link_errors` reads and writes that failed.
@@ -66,7 +68,7 @@ class RoboMasterPlaintext(Transport):
         self.malformed = 0
         self.link_errors = 0
         self._lock = threading.Lock()
-        self._link: ByteLink | None = None
+        self._link: ByteStream | None = None
         self._splitter = Splitter()
         self._engaged = False
         self._lost: MtmError | None = None
@@ -75,7 +77,7 @@ class RoboMasterPlaintext(Transport):
         self._telemetry: PlaintextTelemetry | None = None
 
     @abstractmethod
-    def _connect(self) -> ByteLink:
+    def _connect(self) -> ByteStream:
         """Open the line to the robot; raises MtmError when it cannot be had."""
 
     def _datagrams(self) -> list[bytes]:
@@ -92,15 +94,16 @@ class RoboMasterPlaintext(Transport):
         """Numbered commands since the last one that was answered."""
         return (self._sent - self._answered) % SEQUENCES
 
-    def health(self) -> dict[str, int | float | str | bool]:
-        """Counters of the link; see the class."""
+    def counters(self) -> dict[str, int]:
+        """See the class."""
         return {
-            "answers": self.answers,
-            "refusals": self.refusals,
-            "malformed": self.malformed,
+            "answers": self.answers, "refusals": self.refusals, "malformed": self.malformed,
             "link_errors": self.link_errors,
-            "unanswered": self.unanswered,
-        }
+        }  # fmt: skip
+
+    def health(self) -> dict[str, int | float | str | bool]:
+        """The counters, and how many commands are without an answer."""
+        return {**self.counters(), "unanswered": self.unanswered}
 
     def open(self) -> None:
         """Connect, enter SDK mode standing still, and ask for telemetry.
@@ -177,6 +180,8 @@ class RoboMasterPlaintext(Transport):
         for text in self._splitter.feed(data):
             self._take(text, now_s)
         self.malformed += self._splitter.overlong - overlong
+        is_behind = self._engaged and self.unanswered >= MANY_UNANSWERED
+        self.degraded = "the robot does not answer its commands" if is_behind else ""
         for datagram in self._datagrams():
             for text in datagram.decode("ascii", "replace").split(";"):
                 self._take(text, now_s)
@@ -197,22 +202,26 @@ class RoboMasterPlaintext(Transport):
         with self._lock:
             self._write(self._working_link(), text)
 
-    def _working_link(self) -> ByteLink:
+    def _working_link(self) -> ByteStream:
         if self._link is None or not self._engaged:
             raise MtmError("The link to the robot is not open, or was stopped; open it before sending.")
         if self._lost is not None:
             raise MtmError(str(self._lost)) from self._lost
         return self._link
 
-    def _write(self, link: ByteLink, text: bytes) -> None:
+    def _write(self, link: ByteStream, text: bytes) -> None:
         try:
             # Without waiting for room: where a host's whole queue is full, one more command would be obeyed too late.
             link.write(text, 0.0)
+        except LinkBusyError as error:
+            self.link_errors += 1
+            if not error.has_begun:  # what has begun to leave is finished before the next command, and so was sent
+                raise
         except MtmError:
             self.link_errors += 1
             raise
 
-    def _persist(self, link: ByteLink, text: bytes) -> MtmError | None:
+    def _persist(self, link: ByteStream, text: bytes) -> MtmError | None:
         fault = None
         for _ in range(_STOP_TRIES):
             try:

@@ -3,7 +3,7 @@
 import ipaddress
 import socket
 
-from mtm_onboard.links.byte_link import ByteLink, tcp_link
+from mtm_onboard.links.byte_stream import ByteStream, tcp_stream
 from mtm_onboard.links.plaintext_messages import CONTROL_PORT, PUSH_PORT
 from mtm_onboard.links.robomaster_plaintext import RoboMasterPlaintext
 from mtm_onboard.protocol.errors import MtmError
@@ -37,12 +37,12 @@ class RoboMasterTcp(RoboMasterPlaintext):
         if pushes is not None:
             pushes.close()
 
-    def _connect(self) -> ByteLink:
+    def _connect(self) -> ByteStream:
         pushes = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             pushes.setblocking(False)
             pushes.bind(("", self._push_port))
-            link = tcp_link(self._host, self._port)
+            link = tcp_stream(self._host, self._port)
         except (OSError, OverflowError) as error:
             pushes.close()
             raise MtmError(

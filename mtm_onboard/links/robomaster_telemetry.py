@@ -19,6 +19,7 @@ from mtm_onboard.links.robomaster_messages import (
 )
 
 ADD_NODE: Final = Kind(COMPANION, PUBLISHER, WANTS_ACK_WHEN_DONE, 0x48, 0x01)
+RESET_NODE: Final = Kind(COMPANION, PUBLISHER, WANTS_ACK_WHEN_DONE, 0x48, 0x02)
 SUBSCRIBE: Final = Kind(COMPANION, PUBLISHER, WANTS_ACK_WHEN_DONE, 0x48, 0x03)
 UNSUBSCRIBE: Final = Kind(COMPANION, PUBLISHER, WANTS_ACK_WHEN_DONE, 0x48, 0x04)
 PUSH: Final = Kind(PUBLISHER, COMPANION, WANTS_ACK_NOW, 0x48, 0x08)
@@ -115,12 +116,18 @@ def parse_unsubscription(payload: bytes) -> int:
 
 
 def push_payload(subscription: Subscription, telemetry: Telemetry) -> bytes:
-    """Payload of one push, as the robot sends it."""
+    """Payload of one push of topics that are known here, as the robot sends it."""
+    data = b"".join([topic_data(topic, telemetry) for topic in subscription.topics])
+    return push_head(subscription, telemetry.robot_time_s) + data
+
+
+def push_head(subscription: Subscription, robot_time_s: float) -> bytes:
+    """What stands before the topics in the payload of a push."""
     head = _PUSH.pack(_PERIODIC, subscription.stream)
     if subscription.is_stamped:
-        stamp_us = round(telemetry.robot_time_s * 1e6)
+        stamp_us = round(robot_time_s * 1e6)
         head += _STAMP.pack(stamp_us // 1000 & _WORD, stamp_us & _WORD)
-    return head + b"".join([_topic_data(topic, telemetry) for topic in subscription.topics])
+    return head
 
 
 def parse_push(payload: bytes, subscription: Subscription, received_s: float) -> Telemetry | None:
@@ -151,7 +158,8 @@ def parse_push(payload: bytes, subscription: Subscription, received_s: float) ->
     )
 
 
-def _topic_data(topic: int, telemetry: Telemetry) -> bytes:
+def topic_data(topic: int, telemetry: Telemetry) -> bytes:
+    """The bytes of one of `TOPICS` in a push."""
     layout = _LAYOUTS[topic]
     if topic == VELOCITY:
         start_x, start_y = telemetry.velocity_start_mps

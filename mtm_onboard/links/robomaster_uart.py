@@ -1,6 +1,6 @@
 """The RoboMaster EP's UART."""
 
-from mtm_onboard.links.byte_link import ByteLink, serial_link
+from mtm_onboard.links.byte_stream import ByteStream, serial_stream
 from mtm_onboard.links.plaintext_messages import BAUDRATE
 from mtm_onboard.links.robomaster_plaintext import RoboMasterPlaintext
 
@@ -13,5 +13,5 @@ class RoboMasterUart(RoboMasterPlaintext):
         self._port = port
         self._baudrate = baudrate
 
-    def _connect(self) -> ByteLink:
-        return serial_link(self._port, self._baudrate)
+    def _connect(self) -> ByteStream:
+        return serial_stream(self._port, self._baudrate)

@@ -11,12 +11,13 @@ import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.input_file import opened
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -32,8 +33,15 @@ COLUMNS = (
 )  # fmt: skip
 _NUMBER_DIGITS = 6
 
+# What no run writes: beyond every clock, speed and tick, beyond the alphabets, and beyond the year 9999.
+_LARGEST_NUMBER = 1e12
+_LARGEST_SYMBOL = 65_535
+_LATEST_UNIX_S = 253_402_300_799.0
+# A tick's row has a time within that tick.
+_MOST_OFF_TICKS = 2.0
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, kw_only=True)
 class JournalHeader:
     """What the rows belong to. `symbols` is the whole message, None when only base commands were sent.
 
@@ -60,7 +68,7 @@ class Event:
     text: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class JournalRecord:
     """A journal read back: n rows. `base` and `sent` are (n, 3): vx, vy in m/s and wz in rad/s.
 
@@ -121,11 +129,8 @@ def read_journal(path: Path) -> JournalRecord:
     events: dict[Event, None] = {}
     damaged = 0
     for segment in segments(path) or [path]:
-        try:
-            lines = segment.read_text(encoding="utf-8", errors="replace").split("\n")
-        except OSError as error:
-            raise MtmError(f"cannot read the journal {segment}: {error.strerror}; check the name") from error
-        content = _content(lines)
+        with opened(segment, "the journal") as file:
+            content = _content(file.read().decode("utf-8", errors="replace").split("\n"))
         header = content.header or header
         tables.append(content.rows)
         events.update(dict.fromkeys(content.events))
@@ -133,10 +138,22 @@ def read_journal(path: Path) -> JournalRecord:
     if header is None:
         raise MtmError(f"{path} does not begin like a journal; name a file that mtm-onboard run wrote")
     columns = np.concatenate(tables)
+    # A digit too many in a tick's number would else stand for years without a row.
+    off_ticks = (columns[:, 1] - header.start_s) * header.rate_hz - columns[:, 0]
+    sound = np.abs(off_ticks) <= _MOST_OFF_TICKS
+    damaged += int(np.count_nonzero(~sound))
+    columns = columns[sound]
     return JournalRecord(
-        header, columns[:, 0].astype(np.int64), columns[:, 1], columns[:, 2:5], columns[:, 5:8], columns[:, 8],
-        columns[:, 9].astype(np.int64), damaged, tuple(events),
-    )  # fmt: skip
+        header=header,
+        ticks=columns[:, 0].astype(np.int64),
+        times_s=columns[:, 1],
+        base=columns[:, 2:5],
+        sent=columns[:, 5:8],
+        lateness_s=columns[:, 8],
+        flags=columns[:, 9].astype(np.int64),
+        damaged=damaged,
+        events=tuple(events),
+    )
 
 
 @dataclass(frozen=True)
@@ -165,28 +182,53 @@ def _content(lines: list[str]) -> _Content:
         elif line and line != names:
             damaged += 1
     columns = np.array(rows, dtype=np.float64).reshape(-1, len(COLUMNS))
-    sound = np.isfinite(columns).all(axis=1)
+    ticks, flags = columns[:, 0], columns[:, -1]
+    # NaN is in no range.
+    sound = np.all(np.abs(columns) <= _LARGEST_NUMBER, axis=1) & (np.floor(ticks) == ticks)
+    sound &= (flags >= 0) & (flags < 2 * UNSENT) & (np.floor(flags) == flags)
     return _Content(header, columns[sound], events, damaged + int(np.count_nonzero(~sound)))
 
 
 def _header(table: dict[str, Any]) -> JournalHeader | None:
     try:
         symbols = table["symbols"]
-        return JournalHeader(**table | {"symbols": None if symbols is None else tuple(symbols)})
+        header = JournalHeader(**table | {"symbols": None if symbols is None else tuple(symbols)})
     except (TypeError, KeyError):
         return None
+    texts = (header.fingerprint, header.key_id, header.robot, header.channel)
+    symbols_fit = all(_is_whole(symbol, 0, _LARGEST_SYMBOL) for symbol in header.symbols or ())
+    rate_fits = _is_number(header.rate_hz, 0.0, _LARGEST_NUMBER) and header.rate_hz > 0
+    starts_fit = _is_number(header.start_s, -_LARGEST_NUMBER, _LARGEST_NUMBER) and (
+        header.start_unix_s is None or _is_number(header.start_unix_s, 0.0, _LATEST_UNIX_S)
+    )
+    fits = all(map(_is_text, texts)) and isinstance(header.repeat, bool) and symbols_fit and rate_fits and starts_fit
+    return header if fits else None
 
 
 def _event(table: dict[str, Any]) -> Event | None:
     tick, text = table.get("tick"), table.get("text")
-    return Event(tick, text) if isinstance(tick, int) and isinstance(text, str) else None
+    largest = int(_LARGEST_NUMBER)
+    return Event(tick, text) if _is_whole(tick, -largest, largest) and _is_text(text) else None
+
+
+def _is_whole(value: Any, low: int, high: int) -> TypeGuard[int]:
+    return type(value) is int and low <= value <= high
+
+
+def _is_number(value: Any, low: float, high: float) -> bool:
+    return type(value) in (int, float) and low <= value <= high
+
+
+def _is_text(value: Any) -> TypeGuard[str]:
+    """Text that can be written out, which half of a surrogate pair cannot."""
+    return isinstance(value, str) and value == value.encode("utf-8", "replace").decode()
 
 
 def _table(line: str) -> dict[str, Any]:
     """The JSON object after `# `; empty when there is none."""
     try:
         table = json.loads(line.removeprefix("# "))
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return table if isinstance(table, dict) else {}
 

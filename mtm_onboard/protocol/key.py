@@ -3,8 +3,6 @@
 import os
 import re
 import secrets
-import stat
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,6 +10,7 @@ from typing import Any
 from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.input_file import BrokenTextError, decoded, opened, parsed_toml
 from mtm_onboard.protocol.keystream import SECRET_BYTES
 from mtm_onboard.protocol.scheme import Scheme, scheme_from_table
 from mtm_onboard.protocol.schemefile import scheme_text
@@ -93,17 +92,11 @@ def _secret(text: Any, path: Path) -> bytes:
 
 def _read_private_toml(path: Path) -> dict[str, Any]:
     try:
-        with path.open("rb") as file:
+        with opened(path, "the key file") as file:
             mode = os.fstat(file.fileno()).st_mode
-            if not stat.S_ISREG(mode):
-                raise MtmError(f"{path} is not a file; name a key file")
             if mode & 0o077:
                 raise MtmError(f"{path} can be read by others (mode {mode & 0o777:04o}); run: chmod 600 {path}")
-            return tomllib.loads(file.read().decode("utf-8"))
-    except OSError as error:
-        raise MtmError(f"cannot read the key file {path}: {error.strerror}; check the name") from error
-    except UnicodeDecodeError as error:
-        raise MtmError(f"{path} is not a key file (not text); name the file that mtm-onboard keygen wrote") from error
-    except tomllib.TOMLDecodeError as error:
-        # The parser's message may quote the line, and the line may hold the secret.
-        raise MtmError(f"{path} is not valid TOML; name the file that mtm-onboard keygen wrote") from error
+            return parsed_toml(decoded(file, path))
+    except BrokenTextError:
+        # The parser's message may quote the line, and the line may hold the secret: neither is told, nor is the cause.
+        raise MtmError(f"{path} is not valid TOML; name the file that mtm-onboard keygen wrote") from None

@@ -38,7 +38,7 @@ class Channel:
     sigma: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Scheme:
     """Every agreed parameter: rate and band in hertz, alphabet size M, message length T in ticks, channels.
 

@@ -1,11 +1,11 @@
 """The scheme file: a scheme without a key, in TOML, as `mtm-audit plan` writes and `mtm-onboard keygen` reads it."""
 
-import tomllib
 from dataclasses import asdict
 from pathlib import Path
 
 from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.input_file import BrokenTextError, parsed_toml, read_text
 from mtm_onboard.protocol.scheme import Scheme, scheme_from_table
 
 _SCHEME_PARAMETERS = (
@@ -36,12 +36,10 @@ def save_scheme(scheme: Scheme, path: Path, comments: tuple[str, ...] = ()) -> N
 def load_scheme(path: Path) -> Scheme:
     """Read a scheme file; raises MtmError with one sentence that says what to change."""
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise MtmError(f"cannot read the scheme file {path}: {error.strerror}; check the name") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        table = parsed_toml(read_text(path, "the scheme file"))
+    except BrokenTextError:
         # The parser's message may quote a line, and the file may be a key's.
-        raise MtmError(f"{path} is not a scheme file; name one that mtm-audit plan wrote") from error
+        raise MtmError(f"{path} is not a scheme file; name one that mtm-audit plan wrote") from None
     if table.keys() != {"scheme"} or not isinstance(table["scheme"], dict):
         raise MtmError(f"{path} must hold one table, [scheme], and nothing else; name one that mtm-audit plan wrote")
     try:

@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from typing import Any
 
-from mtm_onboard.links.base import Transport
+from mtm_onboard.links.base import Link
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.ros.twist import set_velocity
 
 
-class TwistLink(Transport):
+class TwistLink(Link):
     """Publishes each command as a twist; `make` gives a twist whose components are zero."""
 
     def __init__(self, make: Callable[[], Any], publish: Callable[[Any], None]) -> None:

@@ -1,19 +1,19 @@
-"""The robot's configuration: one TOML file, explained field by field in docs/robot.example.toml."""
+"""The robot's configuration: one TOML file, explained field by field in examples/robots/none.toml."""
 
 import math
-import tomllib
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.input_file import BrokenTextError, parsed_toml, read_text
 from mtm_onboard.runtime.guard import Limits, Staleness
 
 Option = str | int | float | bool
 _SECTIONS = ("robot", "transport", "link", "limits", "stale", "source", "journal", "control", "realtime")
 _OPTIONAL_SECTIONS = ("link", "stale", "journal", "control", "realtime")
-_SOURCE_KINDS = ("udp", "stdin")
+_SOURCE_KINDS = ("unix", "udp", "stdin")
 _T = TypeVar("_T")
 
 
@@ -27,18 +27,26 @@ class Robot:
 
 @dataclass(frozen=True)
 class SourceSettings:
-    """Where base commands come from: "udp" with a loopback `port`, or "stdin" without one."""
+    """Where base commands come from: "unix" with the path of a `socket`, "udp" with a loopback `port`, or "stdin"."""
 
-    kind: str
+    kind: str = "unix"
+    socket: str | None = None
     port: int | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in _SOURCE_KINDS:
             raise MtmError(f"kind is {self.kind!r}; choose one of: {', '.join(_SOURCE_KINDS)}")
+        if (self.kind == "unix") != bool(self.socket):
+            raise MtmError("a socket belongs to kind unix and to no other; add its path or remove it")
         if (self.kind == "udp") != (self.port is not None):
             raise MtmError("a port belongs to kind udp and to no other; add or remove it")
         if self.port is not None and not 1 <= self.port <= 65_535:
             raise MtmError(f"port is {self.port}; choose 1 to 65535")
+
+    def __str__(self) -> str:
+        return {
+            "unix": f"the socket {self.socket}", "udp": f"UDP port {self.port}", "stdin": "standard input",
+        }[self.kind]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -93,7 +101,7 @@ class RealtimeSettings:
             raise MtmError(f"cpu is {self.cpu}; choose the number of a processor, from 0 on, or leave it out")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RobotConfig:
     """All of it. `transport_options` are the fields of [transport] beside its kind.
 
@@ -115,13 +123,9 @@ class RobotConfig:
 def load_config(path: Path) -> RobotConfig:
     """Read a configuration; raises MtmError with one sentence that says what to change."""
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise MtmError(f"cannot read the configuration {path}: {error.strerror}; check the name") from error
-    except UnicodeDecodeError as error:
-        raise MtmError(f"{path} is not text; name a configuration such as docs/robot.example.toml") from error
-    except tomllib.TOMLDecodeError as error:
-        raise MtmError(f"{path} is not valid TOML ({error}); correct that line") from error
+        table = parsed_toml(read_text(path, "the configuration"))
+    except BrokenTextError as error:
+        raise MtmError(f"{path} is not valid TOML ({error}); correct that line, or name another file") from error
     try:
         return config_from_table(table)
     except MtmError as error:

@@ -1,6 +1,12 @@
 """The guard: what may be sent. When anything is wrong the noise goes first and the base command stays.
 
 Motion itself stops only when the base command is stale or the operator says stop.
+
+The guard of the microcontroller (`firmware_shim`, `mtm_shim.h`) ages and fades base commands alike and refuses what is
+not finite alike, and differs in these limits: it bounds each axis by itself, so that (vx, vy) may reach the square root
+of two times a limit that here bounds their norm; it cuts the sum of base and noise axis by axis, where here the noise
+is shortened along its direction; the noise of an axis is bounded by the image; changes from tick to tick are not
+bounded; and its stop can be released.
 """
 
 import math
@@ -78,6 +84,14 @@ class Guard:
     def stop(self) -> None:
         """Latch the operator's stop."""
         self._stopped = True
+
+    def age_s(self, now_s: float) -> float:
+        """Age of the newest good base command, infinite before any."""
+        return now_s - self._arrived_s
+
+    def is_stale(self, now_s: float) -> bool:
+        """Whether that is so old that the noise is off."""
+        return self.age_s(now_s) + _HAIR_S >= self._noise_off_s
 
     @property
     def noise_allowed(self) -> bool:

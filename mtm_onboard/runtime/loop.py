@@ -39,10 +39,16 @@ class Lateness:
 
 
 class LoopStats:
-    """What a loop did: ticks `sent`, ticks `missed`, steps that took over a period, and each wake-up's lateness."""
+    """What became of each tick that was due: `sent`, `unsent` or `missed`; and how late the loop was.
+
+    In a tick that was sent the command left for the robot, in an unsent one the loop ran and the command did not leave,
+    and in a missed one the loop came too late to run. `overruns` counts steps that took over a period. `lateness` is
+    from the instant that the loop waited for to its wake-up, so one that has missed ticks is over a period.
+    """
 
     def __init__(self) -> None:
         self.sent = 0
+        self.unsent = 0
         self.missed = 0
         self.overruns = 0
         self.lateness = Lateness()
@@ -51,17 +57,18 @@ class LoopStats:
 def run_loop(
     clock: Clock,
     rate_hz: float,
-    step: Callable[[int, float], None],
+    step: Callable[[int, float, float], bool | None],
     *,
     start_s: float,
     stop: Callable[[], bool],
     stats: LoopStats | None = None,
 ) -> LoopStats:
-    """Call `step(tick, now_s)` at start_s + tick / rate_hz until `stop()` is true, from the next tick on.
+    """Call `step(tick, now_s, late_s)` at start_s + tick / rate_hz until `stop()` is true, from the next tick on.
 
     Ticks before `start_s` are negative. The number comes from elapsed time: a wake-up that is late by whole
-    periods skips their ticks and counts them as missed, and no tick comes twice or in a burst. `stop` is asked
-    before each tick. `stats`, when given, is filled as the loop runs, so that it outlives an exception.
+    periods skips their ticks and counts them as missed, and no tick comes twice or in a burst. `late_s` is the time
+    since the instant that was awaited, with what was skipped. A step that raises, or returns False, has sent nothing.
+    `stop` is asked before each tick. `stats`, when given, is filled as the loop runs, so that it outlives an exception.
     Raises MtmError when the rate is not above zero.
     """
     if not (math.isfinite(rate_hz) and rate_hz > 0):
@@ -75,9 +82,14 @@ def run_loop(
             return stats
         now_s = clock.now()
         tick = max(awaited, math.floor((now_s - start_s) * rate_hz + _HAIR))
-        stats.lateness.record(now_s - deadline_s)
+        late_s = now_s - deadline_s
+        stats.lateness.record(late_s)
         stats.missed += tick - awaited
-        step(tick, now_s)
+        has_sent = False
+        try:
+            has_sent = step(tick, now_s, late_s) is not False
+        finally:
+            stats.sent += has_sent
+            stats.unsent += not has_sent
         stats.overruns += clock.now() - now_s > 1.0 / rate_hz
-        stats.sent += 1
         awaited = tick + 1

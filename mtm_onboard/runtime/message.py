@@ -20,6 +20,11 @@ class Message(Protocol):
         """Counts the messages of a run; carried in the frame when the scheme says so."""
         ...
 
+    @property
+    def words(self) -> str:
+        """What it says, for people, such as "number 178"."""
+        ...
+
     def symbols(self, slot: int) -> tuple[int, ...]:
         """The whole message's L symbols in the order in which `slot` plays them. May be called from any thread."""
         ...
@@ -38,10 +43,16 @@ Played = Message | Sequence[int] | Silence
 
 @dataclass(frozen=True)
 class PlainMessage:
-    """The same symbols in every slot."""
+    """The same symbols in every slot; `content` is what they spell, None when they stand for themselves."""
 
     played: tuple[int, ...]
     number: int = 0
+    content: int | None = None
+
+    @property
+    def words(self) -> str:
+        """The number, or the symbols themselves."""
+        return words_of(self.played if self.content is None else self.content)
 
     def symbols(self, slot: int) -> tuple[int, ...]:
         """All L of them."""
@@ -59,6 +70,11 @@ class FramedMessage:
         self.number = number
         self._key = key
         self._encoded = self._encode(key.scheme.epoch)
+
+    @property
+    def words(self) -> str:
+        """The payload."""
+        return words_of(self.payload)
 
     def symbols(self, slot: int) -> tuple[int, ...]:
         """Permuted as the slot has it; encoded anew when the epoch is another than last time."""
@@ -88,7 +104,16 @@ def message_of(content: Content, key: Key, number: int = 0) -> Message:
             "this key's scheme carries plain numbers and no text or bytes; give a number, or make a key with "
             "mtm-onboard keygen --payload"
         )
-    return PlainMessage(symbols_of_number(content, scheme), number)
+    return PlainMessage(symbols_of_number(content, scheme), number, content)
+
+
+def words_of(content: Content) -> str:
+    """The content for people: number 178, text 'gate 4', bytes 6869, symbols 3,1,0,2."""
+    if isinstance(content, tuple):
+        return f"symbols {','.join(map(str, content))}"
+    if isinstance(content, bytes):
+        return f"bytes {content.hex()}"
+    return f"text {content!r}" if isinstance(content, str) else f"number {content}"
 
 
 def content_from_table(table: dict[str, Any]) -> Content:

@@ -1,19 +1,30 @@
-"""The loop's thread made a real-time one: before other programs, on a processor of its own, with its memory at hand."""
+"""The threads of a run made real-time ones: before other programs, in their order, with their memory at hand."""
 
 import ctypes
 import os
+import sys
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 
 from mtm_onboard.runtime.config import RealtimeSettings
 
 # From <sys/mman.h> of Linux.
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
+# How long a thread that computes may keep the interpreter from the loop; ten times less than usual.
+_SWITCH_INTERVAL_S = 0.0005
 
 
 @contextmanager
-def realtime(settings: RealtimeSettings, warn: Callable[[str], None]) -> Iterator[None]:
+def realtime(
+    settings: RealtimeSettings, warn: Callable[[str], None]
+) -> Iterator[Callable[[threading.Thread | None], None]]:
     """Have the calling thread run as `settings` ask, and as before after the block; locked memory is the process's.
+
+    The block is given a function that puts the process's other threads in their places, to be called when they have
+    begun: the thread it is given, which serves the link, runs one priority below the calling one and all others two
+    below, but not under 1. One that stayed below other programs would be made to wait by them while it holds a lock, or
+    the interpreter, that the loop is waiting for. The choice of a processor is the calling thread's alone.
 
     What the system refuses is left as it was, and `warn` is told once, in a sentence that says what to do about it.
     """
@@ -28,16 +39,36 @@ def realtime(settings: RealtimeSettings, warn: Callable[[str], None]) -> Iterato
                 refused.append(f"this system has no {_NAMES[apply]}, so leave it out")
         if refused:
             warn(f"[realtime] is not wholly in force: {'; '.join(refused)}")
-        yield
+        is_placed = settings.priority is not None and not any("priority" in text for text in refused)
+        own = threading.current_thread()
+
+        def place(heartbeat: threading.Thread | None) -> None:
+            for thread in threading.enumerate() if is_placed else ():
+                if thread is not own and thread.native_id is not None:
+                    below = 1 if thread is heartbeat else 2
+                    with suppress(ProcessLookupError):  # it has just ended
+                        _place(thread.native_id, max(1, (settings.priority or 0) - below), undo)
+
+        yield place
 
 
 def _schedule(settings: RealtimeSettings, undo: ExitStack) -> None:
     if settings.priority is None:
         return
-    # Zero is the calling thread, not the process.
-    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
-    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(settings.priority))
-    undo.callback(os.sched_setscheduler, 0, policy, parameters)
+    _place(0, settings.priority, undo)  # zero is the calling thread, not the process
+    undo.callback(sys.setswitchinterval, sys.getswitchinterval())
+    sys.setswitchinterval(_SWITCH_INTERVAL_S)
+
+
+def _place(thread: int, priority: int, undo: ExitStack) -> None:
+    policy, parameters = os.sched_getscheduler(thread), os.sched_getparam(thread)
+    os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+
+    def take_back() -> None:
+        with suppress(ProcessLookupError):
+            os.sched_setscheduler(thread, policy, parameters)
+
+    undo.callback(take_back)
 
 
 def _pin(settings: RealtimeSettings, undo: ExitStack) -> None:

@@ -3,7 +3,6 @@
 import math
 import os
 import select
-import socket
 from abc import ABC, abstractmethod
 from typing import NamedTuple
 
@@ -29,9 +28,19 @@ NOTHING_YET = Command(STOP, -math.inf, False)
 
 
 class Source(ABC):
-    """A place that base commands come from; `refused` counts input that was malformed, oversized or non-finite."""
+    """A place that base commands come from.
+
+    `refused` counts input that was malformed, oversized or non-finite. Where several may send, `sender` is who drives
+    the robot, `intrusions` counts the commands of others, the latest of them being `intruder`, and `lost` what the
+    system dropped; else they stay as they are here. `stop_reason` says why a command has a stop.
+    """
 
     refused = 0
+    sender = ""
+    intruder = ""
+    intrusions = 0
+    lost = 0
+    stop_reason = "the operator said stop"
 
     @abstractmethod
     def poll(self, now_s: float) -> Command:
@@ -60,8 +69,8 @@ class HeldSource(Source):
         return self._newest
 
 
-class _TextSource(Source):
-    """Takes in texts in the format of `basecommand`."""
+class TextSource(Source):
+    """Takes in texts in the format of `base_command`."""
 
     def __init__(self) -> None:
         self._newest = NOTHING_YET
@@ -83,40 +92,7 @@ class _TextSource(Source):
             self._newest = Command(command, arrived_s, self._newest.stop)
 
 
-class UdpSource(_TextSource):
-    """One command a datagram on a loopback port; `port` 0 takes a free one, found in `port` afterwards.
-
-    Raises MtmError when the port cannot be had.
-    """
-
-    def __init__(self, port: int) -> None:
-        super().__init__()
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self._socket.bind(("127.0.0.1", port))
-        except OSError as error:
-            self._socket.close()
-            raise MtmError(f"cannot listen on UDP port {port}: {error.strerror}; choose another port") from error
-        self._socket.setblocking(False)
-        self.port: int = self._socket.getsockname()[1]
-
-    def poll(self, now_s: float) -> Command:
-        """Drain the socket; the last good datagram wins."""
-        arrived_s = self._arrival_s(now_s)
-        try:
-            for _ in range(_MOST_READS):
-                self._take(self._socket.recv(LONGEST_BYTES + 1), arrived_s)
-        except OSError:
-            # Nothing left, or a socket that fails: either way no command came, and the last one goes on ageing.
-            pass
-        return self._newest
-
-    def close(self) -> None:
-        """Release the port."""
-        self._socket.close()
-
-
-class StdinSource(_TextSource):
+class StdinSource(TextSource):
     """One command a line from a file descriptor, standard input by default. Its end leaves the last command to age."""
 
     def __init__(self, descriptor: int = 0) -> None:

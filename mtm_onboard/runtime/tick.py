@@ -4,7 +4,8 @@ import math
 from typing import Protocol
 
 from mtm_onboard.journal.journal import Journal
-from mtm_onboard.links.base import Transport
+from mtm_onboard.links.base import Link
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.runtime.guard import Guard
@@ -38,61 +39,81 @@ class Runtime:
         modulator: NoiseAdder | None,
         guard: Guard,
         source: Source,
-        transport: Transport,
+        link: Link,
         journal: Journal | None = None,
     ) -> None:
         if modulator is not None:
             modulator.require_body_axes()
-        self.transport_errors = 0
+        self.link_losses = self.link_degradations = 0
         self._up_since_s: float | None = -math.inf
         self._after_s = -math.inf
-        self._dropped = transport.dropped
+        self._degraded = ""
+        # Only a link that comes back has outages to follow.
+        self._outages = link if isinstance(link, ReconnectingLink) else None
+        self._dropped = 0 if self._outages is None else self._outages.dropped
         self._stop_noted = False
         self._modulator = modulator
         self._guard = guard
         self._source = source
-        self._transport = transport
+        self._link = link
         self._journal = journal
 
-    def step(self, tick: int, now_s: float) -> None:
-        """Send one command: newest base, guard, noise, limits, send; the journal and the next window come after.
+    def step(self, tick: int, now_s: float, late_s: float = 0.0) -> bool:
+        """Whether one command left: newest base, guard, noise, limits, send; journal and next window come after.
 
-        While the link is down the robot is held at a standstill, and once it is back until a base command has come.
-        Raises MtmError when the transport fails, after the robot was told to stop.
+        `late_s` is how long after its awaited instant the tick began, for the journal. While the link is down the robot
+        is held at a standstill, and once it is back until a base command has come. Raises MtmError when the link fails,
+        after the robot was told to stop.
         """
-        guard, modulator, transport = self._guard, self._modulator, self._transport
+        guard, modulator, link = self._guard, self._modulator, self._link
         velocity, arrived_s, stop = self._source.poll(now_s)
         if stop and not self._stop_noted:
             self._stop_noted = True
             guard.stop()
-            self._note(tick, "the operator said stop")
-        if transport.up_since_s != self._up_since_s:
-            self._follow_link(tick, now_s)
+            self._note(tick, self._source.stop_reason)
+        outages = self._outages
+        if outages is not None and outages.up_since_s != self._up_since_s:
+            self._follow_link(outages, tick, now_s)
+        if link.degraded != self._degraded:
+            self._follow_doubts(tick, link.degraded)
         base = guard.admit(velocity, arrived_s, now_s, after_s=self._after_s)
         wanted = base if modulator is None or not guard.noise_allowed else modulator.add(tick, base)
         sent = guard.limit(base, wanted)
         try:
-            transport.send(sent)
+            link.send(sent)
         except Exception as error:
+            guard.not_sent()
+            self._record(tick, now_s, late_s, base, sent)
             self._note(tick, f"the link failed: {error}")
             self._give_up(error)
-        if transport.dropped != self._dropped:
-            self._dropped = transport.dropped
+        has_left = outages is None or outages.dropped == self._dropped
+        if outages is not None and not has_left:
+            self._dropped = outages.dropped
             guard.not_sent()
-        if self._journal is not None:
-            self._journal.append(tick, now_s, base, sent, guard.flags)
+        self._record(tick, now_s, late_s, base, sent)
         if modulator is not None:
             modulator.prepare(tick)
+        return has_left
 
-    def _follow_link(self, tick: int, now_s: float) -> None:
+    def _record(self, tick: int, now_s: float, late_s: float, base: BodyVelocity, sent: BodyVelocity) -> None:
+        if self._journal is not None:
+            self._journal.append(tick, now_s, base, sent, self._guard.flags, late_s)
+
+    def _follow_doubts(self, tick: int, doubt: str) -> None:
+        """The link has begun or ceased to doubt that the robot obeys, or does so for another reason."""
+        self.link_degradations += bool(doubt) and not self._degraded
+        self._degraded = doubt
+        self._note(tick, f"the link is degraded: {doubt}" if doubt else "the link is no longer degraded")
+
+    def _follow_link(self, link: ReconnectingLink, tick: int, now_s: float) -> None:
         """The link went down or came back; of the commands that arrived up to now none moves the robot any more."""
-        before_s, since_s = self._up_since_s, self._transport.up_since_s
+        before_s, since_s = self._up_since_s, link.up_since_s
         self._up_since_s = since_s
         # A source may say of a command that it arrived now although it came before the link did.
         self._after_s = math.inf if since_s is None else now_s
         if before_s is not None:
-            self.transport_errors += 1
-            self._note(tick, f"the link was lost: {self._transport.fault}")
+            self.link_losses += 1
+            self._note(tick, f"the link was lost: {link.fault}")
         if since_s is not None:
             self._note(tick, "the link is back")
 
@@ -101,9 +122,9 @@ class Runtime:
             self._journal.note(tick, text)
 
     def _give_up(self, error: Exception) -> None:
-        self.transport_errors += 1
+        self.link_losses += 1
         try:
-            self._transport.stop()
+            self._link.stop()
         except Exception as second:
             raise MtmError(
                 f"the robot's link failed ({error}) and so did the stop ({second}); stop the robot by hand"

@@ -18,7 +18,15 @@ def scheme_of(symbols=(2,), ticks=200, bodies=None, alphabet=4, **changes):
     """One channel a body, on vx and vy; `symbols` are the l_c of the channels, `ticks` the message's length."""
     bodies = bodies or [f"robot{number}" for number in range(len(symbols))]
     channels = tuple(Channel(body, body, ("vx", "vy"), count, 0.1) for body, count in zip(bodies, symbols, strict=True))
-    return Scheme("test", 50.0, (0.5, 5.0), alphabet, ticks, channels, **changes)
+    return Scheme(
+        name="test",
+        rate_hz=50.0,
+        band_hz=(0.5, 5.0),
+        alphabet_size=alphabet,
+        message_ticks=ticks,
+        channels=channels,
+        **changes,
+    )
 
 
 def key_of(scheme, secret=FAKE_SECRET):

@@ -19,6 +19,7 @@ from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.picture import Frame
 from mtm_onboard.protocol import save_key
 from tests.audit.moving_robot import FAKE_SECRET, OTHER_SECRET, key_of, robot_track, scheme_of
+from tests.patience import PATIENCE_S
 
 KEY = key_of(scheme_of(symbols=(1, 1), ticks=400))
 ROOT = Path(__file__).parents[2]
@@ -107,7 +108,7 @@ def test_the_beginning_is_searched_for_unless_given(audit, folder):
 
 
 @pytest.mark.parametrize(("name", "key"), [("silent", "robot.key"), ("sent", "other.key")])
-def test_absent_shows_no_symbol_that_could_be_taken_for_a_message(audit, folder, name, key):
+def test_absent_shows_no_symbol_that_looks_like_a_message(audit, folder, name, key):
     code, out, _ = audit(folder / name, *QUICK, key=key)
     assert code == 3
     assert out.startswith("absent: no message of key fake was found")
@@ -201,7 +202,7 @@ def test_an_explanation_stops_where_an_error_stopped_it(audit, folder):
     assert "tracks     robot0: seen in 1001 of 1001 samples" in err
     assert "timing     FAILED: the recording of 'robot0' holds no whole window of 8 s" in err
     code, out, err = audit(folder / "sent/robot0.tum", folder / "nothing.tum", "--explain")
-    assert "recording  FAILED: there is no file" in err
+    assert "recording  FAILED: cannot read the recording" in err
     code, out, err = audit(folder / "sent", "--assign", "robot0=red", "--explain")
     assert "tracks     FAILED: the recording has no track 'red'" in err
 
@@ -220,7 +221,7 @@ def test_a_decode_is_drawn(audit, folder, tmp_path, name, code):
     assert list(tmp_path.iterdir()) == [picture]
 
 
-def test_a_picture_that_cannot_be_written_is_refused_before_the_work(audit, folder, tmp_path, monkeypatch):
+def test_an_unwritable_picture_is_refused_before_the_work(audit, folder, tmp_path, monkeypatch):
     monkeypatch.setattr("mtm_audit.commands.decode.decode_tracks", lambda *_: pytest.fail("worked first"))
     refused(audit(folder / "sent", "--plot", tmp_path / "decode.bmp"), "end the name in .png, .pdf, .svg")
     refused(audit(folder / "sent", "--plot", tmp_path / "nowhere/decode.png"), "choose a folder that exists")
@@ -267,7 +268,7 @@ def test_control_c_during_the_work_leaves_nothing_half_done(folder, tmp_path):
     # Loading takes a moment; what comes before it must end well, too, so the exact instant does not matter.
     time.sleep(1.5)
     busy.send_signal(signal.SIGINT)
-    out, _ = busy.communicate(timeout=30)
+    out, _ = busy.communicate(timeout=PATIENCE_S)
     assert busy.returncode in (130, -signal.SIGINT)
     assert out == ""
     assert list(tmp_path.iterdir()) == []
@@ -276,7 +277,7 @@ def test_control_c_during_the_work_leaves_nothing_half_done(folder, tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("missing.tum", None, "there is no file"),
+        ("missing.tum", None, "No such file"),
         ("empty.tum", b"", "is empty"),
         ("empty.mp4", b"", "is empty"),
         ("text.mp4", b"this is no video", "is not a video that can be read"),
@@ -316,7 +317,7 @@ def test_a_video_without_a_robot_is_refused(audit, video):
     refused(audit(video, "--tracker", "colour:red"), "none of red found in 20 frames")
 
 
-def test_an_explanation_of_a_video_says_that_nothing_was_found_in_it(audit, video):
+def test_an_explained_video_says_that_nothing_was_found(audit, video):
     code, out, err = audit(video, "--explain")
     assert (code, out) == (1, "")
     assert f"recording  video {video}, 20 frames" in err

@@ -107,7 +107,7 @@ def test_fake_keys_look_fake_and_only_one_is_readable_by_others(tmp_path):
     assert f'secret = "{"11" * 32}"' in (tmp_path / "inputs" / "fleet.key").read_text()
 
 
-def test_there_are_thirty_commands_and_they_read_what_came_before():
+def test_thirty_commands_read_what_came_before():
     names = [command.name for command in COMMANDS]
     assert len(set(names)) == 30
     for number, command in enumerate(COMMANDS):

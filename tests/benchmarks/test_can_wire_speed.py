@@ -5,7 +5,7 @@ The simulation of four robots runs five times faster than real time while this s
 
 import pytest
 
-from hil.fleet.direct import DirectTransport
+from hil.fleet.direct import DirectLink
 from hil.vehicles.motion_controller import MotionController
 from mtm_onboard.model.clock import SystemClock
 from mtm_onboard.model.velocity import BodyVelocity
@@ -16,7 +16,7 @@ COMMAND = BodyVelocity(0.1, 0.2, 0.3)
 
 
 @pytest.mark.parametrize("kind", [VirtualRig, LineRig])
-def test_a_command_two_heartbeats_and_a_push_take_well_under_a_millisecond(benchmark, kind):
+def test_a_tick_on_the_wire_takes_well_under_a_millisecond(benchmark, kind):
     with can_rig(kind) as rig, rig.transport:
         if kind is VirtualRig:
             rig.tap.shutdown()
@@ -32,6 +32,6 @@ def test_a_command_two_heartbeats_and_a_push_take_well_under_a_millisecond(bench
 
 def test_a_command_without_a_wire_takes_a_few_microseconds(benchmark):
     controller = MotionController(FloatingPlant())
-    with DirectTransport(controller, SystemClock()) as link:
+    with DirectLink(controller, SystemClock()) as link:
         benchmark(link.send, COMMAND)
         assert controller.demand != (0.0, 0.0, 0.0)

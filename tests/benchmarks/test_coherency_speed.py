@@ -48,7 +48,7 @@ def processor_s(function, *arguments, repeats):
     return min(times_s), result
 
 
-def test_all_candidates_at_once_are_ten_times_faster_than_one_by_one(capsys):
+def test_all_candidates_at_once_are_ten_times_faster(capsys):
     codebook = Codebook(KEY.secret, KEY.scheme)
     glimpse = glimpse_of_track(robot_track(KEY, "robot0", (5,), 15.0))
     bins, candidates = codebook.bins(CHANNEL), codebook.samples(CHANNEL, 0)

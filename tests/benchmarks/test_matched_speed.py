@@ -61,7 +61,7 @@ def measured(benchmark, case, *, decoys=0, rounds=2):
     return taken_s
 
 
-def test_a_minute_of_256_symbols_is_read_thirty_times_faster_than_real_time(benchmark, capsys):
+def test_a_minute_of_256_symbols_is_30_times_real_time(benchmark, capsys):
     case = recording(256)
     taken_s = measured(benchmark, case)
     if taken_s is not None:
@@ -75,7 +75,7 @@ def test_a_minute_of_256_symbols_is_read_thirty_times_faster_than_real_time(benc
         assert SECONDS / taken_s >= 30.0
 
 
-def test_a_minute_of_4096_symbols_is_read_five_times_faster_than_real_time(benchmark, capsys):
+def test_a_minute_of_4096_symbols_is_5_times_real_time(benchmark, capsys):
     taken_s = measured(benchmark, recording(4096), rounds=1)
     if taken_s is not None:
         with capsys.disabled():
@@ -107,7 +107,7 @@ def test_half_a_gigabyte_of_memory_is_enough(benchmark, capsys, alphabet):
     assert peak < 500 * MEGABYTE
 
 
-def test_cost_grows_no_faster_than_the_recording_and_the_alphabet(benchmark, capsys):
+def test_cost_grows_no_faster_than_recording_and_alphabet(benchmark, capsys):
     if not benchmark.enabled:
         pytest.skip("compares times; run with --benchmark-enable")
     plain, longer, larger = recording(256), recording(256, 4.0 * SECONDS), recording(1024)

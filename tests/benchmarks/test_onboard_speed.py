@@ -8,7 +8,7 @@ from itertools import count
 import numpy as np
 import pytest
 
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import Channel, Codebook, Scheme
 from mtm_onboard.runtime.guard import Guard, Limits, Staleness
@@ -52,7 +52,7 @@ def test_modulator_and_guard_take_a_few_microseconds_a_tick(benchmark, schedule)
 
 
 @pytest.mark.parametrize("schedule", ["fixed", "rolling"])
-def test_modulator_and_guard_take_20_microseconds_of_the_processor_at_most(capsys, schedule):
+def test_modulator_and_guard_take_20_microseconds_at_most(capsys, schedule):
     tick = modulated_and_guarded(schedule)
     times_ns = np.empty(10_000)
     for number in range(len(times_ns)):
@@ -90,7 +90,7 @@ def test_ten_thousand_ticks_leave_no_memory_taken(capsys, schedule):
 
 
 def test_a_whole_tick_on_a_trivial_link_takes_a_few_microseconds(benchmark):
-    source, link, ticks = HeldSource(), NullTransport(), count()
+    source, link, ticks = HeldSource(), NullLink(), count()
     runtime = Runtime(modulator("fixed"), guard(), source, link)
 
     def tick() -> None:

@@ -55,7 +55,7 @@ def table_of(channels, alphabet_sizes, windows, trials=800):
     return AccuracyTable(tuple(points))
 
 
-def test_dynamic_programming_is_fifty_times_faster_than_trying_every_allocation(capsys):
+def test_dynamic_programming_is_fifty_times_faster_than_trying(capsys):
     generator = np.random.default_rng(1)
     logs = [np.log(generator.uniform(0.5, 1.0, 121)) for _ in range(5)]
     lengths = np.arange(12, 240)
@@ -71,7 +71,7 @@ def test_dynamic_programming_is_fifty_times_faster_than_trying_every_allocation(
 
 
 @pytest.mark.parametrize("measured_only", [False, True])
-def test_eight_channels_and_64_symbols_are_searched_in_two_seconds(capsys, measured_only):
+def test_eight_channels_and_64_symbols_take_two_seconds(capsys, measured_only):
     table = table_of(channels=8, alphabet_sizes=(2, 4, 8), windows=20)
     # 64 bits are 64 symbols of M = 2.
     seconds, found = processor_s(search, table, Problem(64, 0.9, measured_only=measured_only), repeats=2)

@@ -41,7 +41,7 @@ def test_the_policy_does_its_task_and_its_message_decodes(example, message):
     assert clipped_share < 0.05
 
 
-def test_the_same_policy_with_random_noise_does_as_well_and_says_nothing(example):
+def test_random_noise_does_as_well_and_says_nothing(example):
     decoded, reached, clipped_share = decoding(example, None, seed=1)
     assert (decoded.verdict, decoded.message) == ("absent", None)
     assert reached >= 10
@@ -58,13 +58,13 @@ def test_the_script_leaves_a_recording_and_its_key(example, tmp_path, capsys, mo
 
 
 @pytest.mark.parametrize("message", ["256", "-1"])
-def test_a_message_that_does_not_fit_is_refused_and_nothing_is_written(example, tmp_path, capsys, message):
+def test_a_message_that_does_not_fit_writes_nothing(example, tmp_path, capsys, message):
     with pytest.raises(SystemExit):
         example.main(["--message", message, "--out", str(tmp_path / "policy")])
     assert "does not fit" in capsys.readouterr().err
     assert not (tmp_path / "policy").exists()
 
 
-def test_the_robot_s_side_of_the_example_knows_nothing_of_the_auditor():
+def test_the_robot_s_side_knows_nothing_of_the_auditor():
     assert "import mtm_audit" not in SCRIPT.read_text()
     assert "from mtm_audit" not in SCRIPT.read_text()

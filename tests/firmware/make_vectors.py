@@ -53,10 +53,16 @@ def reference_vectors() -> list[str]:
     for number, vector in enumerate(VECTORS):
         axis, window = vector["axis"], vector["window"]
         scheme = Scheme(
-            "reference", float(vector["rate_hz"]), (float(vector["band_hz"][0]), float(vector["band_hz"][1])), 512,
-            vector["window_ticks"], (Channel("robot", "robot", ("vx", "vy", "wz")[: axis + 1], 1, 0.1),),
-            power=vector["power"], schedule="rolling" if window else "fixed", epoch=vector["epoch"],
-        )  # fmt: skip
+            name="reference",
+            rate_hz=float(vector["rate_hz"]),
+            band_hz=(float(vector["band_hz"][0]), float(vector["band_hz"][1])),
+            alphabet_size=512,
+            message_ticks=vector["window_ticks"],
+            channels=(Channel("robot", "robot", ("vx", "vy", "wz")[: axis + 1], 1, 0.1),),
+            power=vector["power"],
+            schedule="rolling" if window else "fixed",
+            epoch=vector["epoch"],
+        )
         book = Codebook(bytes.fromhex(vector["key_hex"]), scheme)
         image = channel_image(book, "robot", (vector["symbol"],), limits=WIDE_LIMITS, first_message=window)
         # A quarter of a unit is lost where the reference is rounded to 2**-21.

@@ -98,10 +98,16 @@ def random_image(
         channels = (Channel("other", "a", ("x",), 1, 1.0), Channel("robot", "b", axes, symbols, sigma))
         try:
             scheme = Scheme(
-                "random", rate_hz, (float(low), float(high)), int(rng.integers(2, 300)), ticks, channels,
-                power="window" if rng.integers(2) else "ensemble", schedule="rolling" if rolling else "fixed",
+                name="random",
+                rate_hz=rate_hz,
+                band_hz=(float(low), float(high)),
+                alphabet_size=int(rng.integers(2, 300)),
+                message_ticks=ticks,
+                channels=channels,
+                power="window" if rng.integers(2) else "ensemble",
+                schedule="rolling" if rolling else "fixed",
                 epoch=int(rng.integers(1 << 40)),
-            )  # fmt: skip
+            )
         except MtmError:
             continue
         codebook = Codebook(rng.bytes(32), scheme)

@@ -125,7 +125,7 @@ def test_sequence_and_order_are_kept_in_a_long_mixed_stream():
     assert board.counts.rewritten + board.counts.passed == sum(m[9:11] == b"\x3f\x21" for m in messages)
 
 
-def test_the_low_byte_that_left_early_costs_less_than_2_to_the_minus_16():
+def test_an_early_low_byte_costs_less_than_2_to_the_minus_16():
     board, core = playing(), reference()
     core.tick(board.now_us, None)
     for number in range(50):
@@ -137,7 +137,7 @@ def test_the_low_byte_that_left_early_costs_less_than_2_to_the_minus_16():
         board.now_us += 20_000
 
 
-def test_a_command_with_a_broken_checksum_stays_broken_and_counts_for_nothing():
+def test_a_broken_checksum_stays_broken_and_counts_for_nothing():
     for bit in range(16):
         board = playing()
         message = bytearray(speed_message(0.3, 0.2, -10.0))
@@ -147,7 +147,7 @@ def test_a_command_with_a_broken_checksum_stays_broken_and_counts_for_nothing():
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_a_command_that_is_not_a_number_is_replaced_by_the_last_good_one(bad):
+def test_a_command_that_is_no_number_becomes_the_last_good_one(bad):
     board = silent()
     board.pass_on(aligned(speed_message(0.5, 0.25, 30.0)))
     (message,) = whole_messages(board.pass_on(aligned(speed_message(bad, bad, bad, sequence=1))))
@@ -161,7 +161,7 @@ def test_speeds_beyond_the_limits_are_cut():
     assert wire_speeds(message) == pytest.approx((3.5, -3.5, 10.47 * 180 / np.pi), rel=1e-5)
 
 
-def test_when_commands_stay_away_the_gateway_fades_to_zero_and_keeps_saying_so():
+def test_without_commands_the_gateway_fades_to_zero_and_says_so():
     board = playing()
     board.pass_on(aligned(speed_message(0.5, 0.0, 0.0, sequence=77)))
     assert board.run(95_000) == []
@@ -174,7 +174,7 @@ def test_when_commands_stay_away_the_gateway_fades_to_zero_and_keeps_saying_so()
     assert {message[4:8] for message in resting} == {b"\xc9\xc3\x4d\x00"}
 
 
-def test_the_gateway_says_nothing_of_its_own_before_the_first_command():
+def test_the_gateway_is_silent_before_the_first_command():
     assert playing().run(1_000_000) == []
 
 
@@ -206,7 +206,7 @@ def test_stop_is_said_at_once_and_turns_commands_to_zero():
 
 
 @pytest.mark.parametrize("cmdid", [0x20, 0x22, 0x25])
-def test_while_stopped_other_motion_commands_reach_the_robot_unreadable(cmdid):
+def test_while_stopped_other_commands_arrive_unreadable(cmdid):
     board = playing()
     motion = built(0xC9, 0xC3, 1, 0, 0x3F, cmdid, bytes(8))
     assert whole_messages(board.pass_on(aligned(motion))) == [motion]
@@ -229,7 +229,81 @@ def test_stop_cuts_in_when_a_sender_is_always_inside_a_message():
     assert wire_speeds(messages[-1]) == (0.0, 0.0, 0.0)
 
 
-def test_a_sender_that_falls_silent_inside_a_value_is_brought_to_rest():
+def heartbeat(number: int) -> bytes:
+    return built(9, 0xC3, number & 0xFFFF, 0, 0x3F, 0x60, bytes(14))
+
+
+class Packed:
+    """A sender that fills each frame before it begins the next, whatever message a byte is of."""
+
+    def __init__(self, board: Board) -> None:
+        self.board = board
+        self._rest = b""
+
+    def say(self, message: bytes) -> None:
+        data = self._rest + message
+        whole = len(data) // 8 * 8
+        self._rest = data[whole:]
+        self.board.pass_on(cut(data[:whole], 8))
+
+
+@pytest.mark.parametrize("fill", [False, True])
+def test_a_packed_sender_loses_no_message_to_the_gateway_s_own(fill):
+    board = playing(fill=fill)
+    sender = Packed(board)
+    sender.say(speed_message(0.5, 0.0, 0.0))
+    told = [heartbeat(number) for number in range(300)]
+    for message in told:
+        sender.say(message)
+        board.run(10_000 - 4 * 130, 790)
+    heard = whole_messages(board.sent[CONTROLLER])
+    assert [message for message in heard if message[10] == 0x60] == told[: len(told) - 1]
+    own = [message for message in heard if message[9:11] == b"\x3f\x21"]
+    # From 0.1 s on, or from the first one with fill, one each 20 ms for the three seconds.
+    assert len(own) >= (145 if fill else 140)
+    assert wire_speeds(own[-1]) == (0.0, 0.0, 0.0)
+
+
+def test_a_held_beginning_leaves_with_the_frame_after_it():
+    board = playing()
+    sender = Packed(board)
+    sender.say(speed_message(0.5, 0.0, 0.0))
+    board.run(300_000)
+    for number in range(20):
+        sender.say(heartbeat(number))
+        board.pass_on([Frame(0x7FF, bytes([number]))])
+        board.run(5_000)
+    others = [frame.data[0] for frame in board.sent[CONTROLLER] if frame.id == 0x7FF]
+    assert others == sorted(others)
+    sender.say(heartbeat(20))
+    board.run(1000)
+    heard = [message for message in whole_messages(board.sent[CONTROLLER]) if message[10] == 0x60]
+    assert heard == [heartbeat(number) for number in range(len(heard))]
+    assert len(heard) >= 20
+
+
+def test_a_held_beginning_holds_up_no_frame_of_another_id():
+    board = playing()
+    board.pass_on(aligned(speed_message(0.5, 0.0, 0.0)))
+    board.run(300_000)
+    frames = cut(heartbeat(0) + heartbeat(1), 8)
+    board.pass_on(frames[:4])  # the last of them holds the beginning of the second
+    for number in range(50):
+        frame = Frame(0x7FF, bytes([number]))
+        assert frame in board.pass_on([frame])
+        board.run(7_000)
+    board.pass_on(frames[4:])
+    heard = [message for message in whole_messages(board.sent[CONTROLLER]) if message[10] == 0x60]
+    assert heard == [heartbeat(0), heartbeat(1)]
+
+
+def test_a_packed_sender_s_frames_pass_uncut_while_fresh():
+    board = silent()
+    frames = cut(speed_message(0.5, 0.0, 0.0) + heartbeat(0) + speed_message(0.5, 0.0, 0.0) + heartbeat(1), 8)
+    assert len(board.pass_on(frames)) == len(frames)
+
+
+def test_a_sender_silent_inside_a_value_is_brought_to_rest():
     board = playing()
     board.pass_on(aligned(speed_message(0.5, 0.0, 0.0)))
     lead = built(9, 0xC3, 1, 0, 0x3F, 0x60, bytes(2))
@@ -238,7 +312,7 @@ def test_a_sender_that_falls_silent_inside_a_value_is_brought_to_rest():
     assert wire_speeds(resting[-1]) == (0.0, 0.0, 0.0)
 
 
-def test_a_command_hidden_by_a_lost_frame_is_counted_and_answered_when_stopped():
+def test_a_command_hidden_by_a_lost_frame_is_counted():
     board = playing()
     board.stop = True
     board.run(1000)
@@ -277,13 +351,13 @@ def test_frames_wait_in_order_while_the_line_is_full():
     assert board.sent[COMPANION] == [Frame(0x202, bytes([n])) for n in range(9)]
 
 
-def test_a_frame_that_claims_more_than_eight_bytes_is_dropped_and_counted():
+def test_a_frame_of_more_than_eight_bytes_is_dropped():
     board = playing()
     assert board.pass_on([Frame(STREAM, bytes(9)), Frame(STREAM, b"ab")]) == [Frame(STREAM, b"ab")]
     assert board.counts.overlong == 1
 
 
-def test_a_value_that_could_not_be_changed_in_time_makes_its_command_unreadable():
+def test_a_value_changed_too_late_makes_its_command_unreadable():
     board = playing()
     lead = built(9, 0xC3, 1, 0, 0x3F, 0x60, bytes(2))
     frames = cut(lead + speed_message(0.5, 0.5, 0.5), 8)

@@ -23,7 +23,7 @@ def test_nothing_moves_before_the_first_command():
     assert player.counts.deadman_trips == 0
 
 
-def test_noise_ends_at_100_ms_and_motion_at_250_ms_without_a_command():
+def test_noise_ends_at_100_ms_and_motion_at_250_ms():
     player = playing()
     player.tick(0, BASE)
     assert player.tick(99_999, None) != list(BASE)
@@ -48,7 +48,7 @@ def test_a_stale_command_only_fades_and_carries_no_noise(hold_ms, span_ms, age_u
         assert out == pytest.approx([value * part for value in BASE], abs=ONE / 256 + 1)
 
 
-def test_a_command_after_silence_brings_the_noise_back_in_its_own_time():
+def test_a_command_after_silence_brings_the_noise_back():
     steady, interrupted = playing(), playing()
     for tick in range(30):
         expected = steady.tick(20_000 * tick, BASE)
@@ -57,7 +57,7 @@ def test_a_command_after_silence_brings_the_noise_back_in_its_own_time():
             assert heard == expected
 
 
-def test_stop_is_latched_until_released_and_then_waits_for_a_new_command():
+def test_stop_is_latched_and_then_waits_for_a_new_command():
     player = playing()
     player.tick(0, BASE)
     player.lib.mtm_shim_stop(player.shim)

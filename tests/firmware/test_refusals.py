@@ -98,7 +98,7 @@ def test_a_field_at_the_edge_of_its_range_is_taken(layout, offset, value):
     assert offered(with_field(layout, offset, value)) == "MTM_OK"
 
 
-def test_fields_that_are_for_the_record_do_not_matter_to_the_device():
+def test_fields_for_the_record_do_not_matter_to_the_device():
     assert offered(with_field("<Q", 24, 2**64 - 1)) == "MTM_OK"
     assert offered(with_field("<16s", 72, b"not a tag at all")) == "MTM_OK"
 

@@ -12,10 +12,10 @@ from mtm_onboard.runtime.modulator import Modulator
 SECRET = b"not a real secret, only for test"
 
 
-def test_robots_move_the_same_with_the_message_from_c_as_from_python():
+def test_robots_move_the_same_by_c_as_by_python():
     key = Key("rig", SECRET, fleet_scheme(200))
     runs = [
-        run_lockstep(RunSettings(key, symbols, 5.5, 7, wire="direct", modulator=modulator))
+        run_lockstep(RunSettings(key=key, symbols=symbols, seconds=5.5, seed=7, wire="direct", modulator=modulator))
         for symbols, modulator in (((2, 0, 3, 1), Modulator), ((2, 0, 3, 1), ShimModulator), (None, Modulator))
     ]
     python, shim, silent = (np.array([trajectory.positions_xy_m for trajectory in run.trajectories]) for run in runs)

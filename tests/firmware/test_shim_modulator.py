@@ -14,7 +14,18 @@ BASE = BodyVelocity(0.3, -0.2, 0.1)
 
 def codebook(schedule="fixed", axes=("vy", "vx")):
     channel = Channel("robot", "robot", axes, 3, 0.1)
-    return Codebook(SECRET, Scheme("test", 50.0, (0.5, 5.0), 4, 150, (channel,), schedule=schedule))
+    return Codebook(
+        SECRET,
+        Scheme(
+            name="test",
+            rate_hz=50.0,
+            band_hz=(0.5, 5.0),
+            alphabet_size=4,
+            message_ticks=150,
+            channels=(channel,),
+            schedule=schedule,
+        ),
+    )
 
 
 def both(schedule, **options):
@@ -42,7 +53,7 @@ def test_missed_ticks_and_jumps_shift_nothing(schedule):
     assert difference(*both(schedule), ticks) < 1e-5
 
 
-def test_the_second_buffer_carries_a_rolling_message_into_the_next():
+def test_the_second_buffer_carries_a_rolling_message_on():
     _, shim = both("rolling")
     for tick in range(450):
         shim.add(tick, BASE)
@@ -50,7 +61,7 @@ def test_the_second_buffer_carries_a_rolling_message_into_the_next():
     assert shim._shim.tick == 449
 
 
-def test_perturbation_is_in_multiples_of_sigma_in_the_channels_order_of_axes():
+def test_perturbation_is_in_sigmas_in_the_channel_s_axis_order():
     python, shim = both("fixed")
     for tick in range(200):
         np.testing.assert_allclose(shim.perturbation(tick), python.perturbation(tick), atol=1e-4)

@@ -18,6 +18,7 @@ from mtm_audit.readers.motion_capture import read_tum
 from mtm_audit.readers.video import read_frames
 from mtm_onboard.cli import main as onboard
 from mtm_onboard.protocol import load_key
+from tests.patience import PATIENCE_S, until
 
 QUICK = ["record", "--seconds", "2", "--wire", "direct"]
 
@@ -55,7 +56,7 @@ def test_a_rolling_recording_says_when_it_was_made(tmp_path, capsys):
     assert f"decode it with --at {began.replace('+00:00', 'Z')}" in capsys.readouterr().out
 
 
-def test_a_recording_is_filmed_and_a_key_that_is_given_stays_where_it_is(tmp_path):
+def test_a_recording_is_filmed_and_a_given_key_stays(tmp_path):
     run(*QUICK, "--message", 1, "--no-video", "--out", tmp_path / "a")
     key = tmp_path / "a" / "robot.key"
     assert run(*QUICK, "--no-message", "--key", key, "--out", tmp_path / "b") == 0
@@ -83,7 +84,7 @@ def test_two_recordings_of_one_seed_and_key_are_equal(tmp_path):
         (["--message", "1", "--seconds", "1"], "make it last longer"),
     ],
 )
-def test_what_cannot_be_recorded_gets_one_sentence_and_leaves_nothing(tmp_path, capfd, arguments, sentence):
+def test_what_cannot_be_recorded_gets_one_sentence(tmp_path, capfd, arguments, sentence):
     assert run(*QUICK, *arguments, "--no-video", "--out", tmp_path / "a") == 1
     error = capfd.readouterr().err
     assert error.startswith("mtm-hil: ")
@@ -104,7 +105,7 @@ def test_wrong_usage_ends_with_2(tmp_path, arguments):
     assert run("record", "--out", tmp_path / "a", *arguments) == 2
 
 
-def test_in_real_time_the_programs_get_the_key_file_and_a_folder_for_their_journals(tmp_path, monkeypatch, capsys):
+def test_in_real_time_programs_get_key_file_and_folder(tmp_path, monkeypatch, capsys):
     def as_if_in_real_time(settings, key_file, folder):
         assert load_key(key_file) == settings.key
         assert folder.is_dir()
@@ -147,12 +148,9 @@ def test_a_program_that_is_asked_to_end_leaves_nothing(tmp_path, request_to_end,
     # Programs in the background inherit that interrupts are ignored, and this one is to be interrupted.
     heed = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
     started = subprocess.Popen([program("mtm-hil"), *wanted], stderr=subprocess.PIPE, preexec_fn=heed)
-    deadline_s = time.monotonic() + 20.0
-    while not list(tmp_path.iterdir()):
-        assert time.monotonic() < deadline_s
-        time.sleep(0.02)
+    until(lambda: list(tmp_path.iterdir()))
     started.send_signal(request_to_end)
-    _, error = started.communicate(timeout=20.0)
+    _, error = started.communicate(timeout=PATIENCE_S)
     assert (started.returncode, error.count(b"\n")) == (code, says)
     assert list(tmp_path.iterdir()) == []
 
@@ -180,7 +178,7 @@ def quick_rollouts(monkeypatch):
     monkeypatch.setattr("os.sched_getaffinity", lambda _: {0})
 
 
-def test_calibrating_writes_the_plant_s_file_and_prints_every_candidate(quick_rollouts, tmp_path, capsys):
+def test_calibrating_writes_the_plant_and_prints_candidates(quick_rollouts, tmp_path, capsys):
     cells, plant = tmp_path / "cells.jsonl", tmp_path / "plant.toml"
     assert run("calibrate", "-n", 2, "--out", plant, "--cells", cells) == 0
     assert "slip_mps = 0.0425\n" in plant.read_text()

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 _COMPARISONS = {
     ast.Lt: (ast.LtE, ast.GtE), ast.LtE: (ast.Lt, ast.Gt), ast.Gt: (ast.GtE, ast.LtE), ast.GtE: (ast.Gt, ast.Lt),
     ast.Eq: (ast.NotEq,), ast.NotEq: (ast.Eq,), ast.Is: (ast.IsNot,), ast.IsNot: (ast.Is,),
+    ast.In: (ast.NotIn,), ast.NotIn: (ast.In,),
 }  # fmt: skip
 _OPERATORS = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult,
-    ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd,
+    ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd, ast.BitXor: ast.BitOr, ast.LShift: ast.RShift, ast.RShift: ast.LShift,
+    ast.FloorDiv: ast.Mult, ast.Mod: ast.FloorDiv,
 }  # fmt: skip
 _NAMES = {"min": "max", "max": "min"}
 
@@ -30,30 +32,59 @@ def mutants_of(source: str) -> list[Mutant]:
     Texts, annotations and decorators stay as they are.
     """
     tree = ast.parse(source)
-    before = list(_headers(tree))
     found: dict[str, Mutant] = {}
-    for place, node in enumerate(_changeable(tree)):
-        for number in range(len(list(_replacements(node)))):
-            changed = copy.deepcopy(tree)
-            old = list(_changeable(changed))[place]
-            _replace(changed, old, list(_replacements(old))[number])
-            after = list(_headers(changed))
-            pairs = [f"{was} -> {now}" for (where, was), (_, now) in zip(before, after, strict=True) if was != now]
-            where = next(where for (where, was), (_, now) in zip(before, after, strict=True) if was != now)
-            name = f"{where}: {pairs[0]}"
-            found.setdefault(name, Mutant(name, ast.unparse(ast.fix_missing_locations(changed))))
+    for place in _places(tree, "module", None):
+        for replacement in list(_replacements(place.node)):
+            before = _header(place.statement)
+            place.put(replacement)
+            after = _header(replacement if place.statement is place.node else place.statement)
+            name = f"{place.where}: {before} -> {after}"
+            if before != after and name not in found:
+                found[name] = Mutant(name, ast.unparse(tree))
+            place.put(place.node)
     return list(found.values())
 
 
-def _changeable(tree: ast.AST) -> Iterator[ast.AST]:
-    """All nodes but those of texts, annotations and decorators."""
-    for name, value in ast.iter_fields(tree):
-        if name in ("annotation", "returns", "decorator_list") or isinstance(tree, ast.JoinedStr):
+@dataclass(frozen=True)
+class _Place:
+    """Where a node stands: the function it is in, its statement, and its parent's field or place in a list of it."""
+
+    where: str
+    statement: ast.stmt
+    node: ast.AST
+    parent: ast.AST
+    field: str
+    index: int | None
+
+    def put(self, other: ast.AST) -> None:
+        """Let `other` stand there."""
+        if self.index is None:
+            setattr(self.parent, self.field, other)
+        else:
+            getattr(self.parent, self.field)[self.index] = other
+
+
+def _places(parent: ast.AST, where: str, statement: ast.stmt | None) -> Iterator[_Place]:
+    """Those of all nodes but texts, annotations and decorators."""
+    for field, value in ast.iter_fields(parent):
+        if field in ("annotation", "returns", "decorator_list") or isinstance(parent, ast.JoinedStr):
             continue
-        for node in value if isinstance(value, list) else [value]:
-            if isinstance(node, ast.AST):
-                yield node
-                yield from _changeable(node)
+        for index, node in enumerate(value) if isinstance(value, list) else [(None, value)]:
+            if not isinstance(node, ast.AST):
+                continue
+            inside, own = where, statement
+            if isinstance(node, ast.stmt):
+                own = node
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                inside = node.name if where == "module" else f"{where}.{node.name}"
+            if own is not None:
+                yield _Place(inside, own, node, parent, field, index)
+            yield from _places(node, inside, own)
+
+
+def _header(statement: ast.AST) -> str:
+    """A statement's first line."""
+    return ast.unparse(statement).partition(":\n")[0].strip()
 
 
 def _replacements(node: ast.AST) -> Iterator[ast.AST]:
@@ -62,7 +93,7 @@ def _replacements(node: ast.AST) -> Iterator[ast.AST]:
         for place, old in enumerate(node.ops):
             for other in _COMPARISONS.get(type(old), ()):
                 yield ast.Compare(node.left, [*node.ops[:place], other(), *node.ops[place + 1 :]], node.comparators)
-    elif isinstance(node, ast.If | ast.IfExp):
+    elif isinstance(node, ast.If | ast.IfExp) and not _is_for_type_checkers(node):
         for value in (True, False):
             changed = copy.copy(node)
             changed.test = ast.Constant(value)
@@ -86,28 +117,12 @@ def _replacements(node: ast.AST) -> Iterator[ast.AST]:
         yield ast.Pass()
 
 
+def _is_for_type_checkers(node: ast.If | ast.IfExp) -> bool:
+    return isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+
+
 def _is_left_out_easily(node: ast.AST) -> bool:
     """A call for its effect, or a value kept in an attribute."""
     if isinstance(node, ast.Expr):
         return isinstance(node.value, ast.Call)
     return isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Attribute)
-
-
-def _replace(tree: ast.AST, old: ast.AST, new: ast.AST) -> None:
-    for parent in ast.walk(tree):
-        for name, value in ast.iter_fields(parent):
-            if value is old:
-                setattr(parent, name, new)
-            elif isinstance(value, list) and any(node is old for node in value):
-                value[[node is old for node in value].index(True)] = new
-
-
-def _headers(tree: ast.AST, where: str = "module") -> Iterator[tuple[str, str]]:
-    """Each statement's function and first line, in order."""
-    for node in ast.iter_child_nodes(tree):
-        inside = where
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            inside = node.name if where == "module" else f"{where}.{node.name}"
-        if isinstance(node, ast.stmt):
-            yield inside, ast.unparse(node).partition(":\n")[0].strip()
-        yield from _headers(node, inside)

@@ -5,6 +5,9 @@ import pytest
 from tests.mutation.mutate import mutants_of
 
 SOURCE = '''
+if TYPE_CHECKING:
+    from typing import Any
+
 LIMIT = 3
 
 class Counter:
@@ -18,6 +21,8 @@ class Counter:
             self.count += 1
             self.last = min(part, -LIMIT)
             self.tell(f"{part:.3f} of 7")
+            if part in self.known:
+                self.word = self.word << 1 ^ part % 2
             return True
         raise ValueError("at most 3")
 '''
@@ -45,6 +50,10 @@ def changes() -> dict[str, str]:
         "self.last = min(part, -LIMIT) -> pass",
         "self.tell(f'{part:.3f} of 7') -> pass",
         "return True -> return False",
+        "if part in self.known -> if part not in self.known",
+        "self.word = self.word << 1 ^ part % 2 -> self.word = self.word >> 1 ^ part % 2",
+        "self.word = self.word << 1 ^ part % 2 -> self.word = self.word << 1 | part % 2",
+        "self.word = self.word << 1 ^ part % 2 -> self.word = self.word << 1 ^ part // 2",
     ],
 )
 def test_every_small_mistake_is_made(change):
@@ -63,6 +72,7 @@ def test_texts_and_annotations_stay_as_they_are():
         assert '"""Counts."""' in source
         assert "at most 3" in source
         assert "part: float" in source
+        assert "if TYPE_CHECKING" in source
 
 
 def test_a_name_says_in_which_function_the_change_is():

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from hil.fleet.clock import SimulatedClock
 from mtm_onboard.journal.journal import Journal
-from mtm_onboard.links.base import Transport
+from mtm_onboard.links.base import Link
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.runtime.guard import Guard, Limits, Staleness
 from mtm_onboard.runtime.loop import LoopStats, run_loop
@@ -22,7 +22,7 @@ class Driven:
 
     def __init__(
         self,
-        transport: Transport,
+        transport: Link,
         clock: SimulatedClock,
         modulator: NoiseAdder | None = None,
         limits: Limits | None = None,
@@ -41,10 +41,10 @@ class Driven:
         """Tick for so long, with a fresh base command in each tick, or none."""
         end_s = self.clock.now() + seconds - 1e-9
 
-        def step(tick: int, now_s: float) -> None:
+        def step(tick: int, now_s: float, late_s: float) -> bool:
             if base is not None:
                 self.source.set(base, now_s)
-            self._runtime.step(tick, now_s)
+            return self._runtime.step(tick, now_s, late_s)
 
         run_loop(
             self.clock, RATE_HZ, step, start_s=0.0, stop=lambda: stop() or self.clock.now() >= end_s, stats=self.stats

@@ -1,4 +1,3 @@
-import os
 import re
 import select
 import signal
@@ -13,16 +12,14 @@ import pytest
 
 from mtm_onboard.cli import main
 from mtm_onboard.journal.journal import read_journal
-from mtm_onboard.model.clock import SystemClock
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import load_key
 from mtm_onboard.protocol.framing import symbols_of_number
 from mtm_onboard.runtime.client import BaseCommandClient
 from mtm_onboard.runtime.guard import NOISE
 from mtm_onboard.runtime.modulator import Modulator
+from tests.patience import PATIENCE_S
 
-# Its own for each test process, so that two at once on one machine do not meet.
-PORT = 40_000 + os.getpid() % 20_000
 CONFIG = """
 [robot]
 name = "robot0"
@@ -33,10 +30,17 @@ kind = "none"
 speed_mps = 1.0
 turn_rate_radps = 2.0
 [source]
-kind = "udp"
-port = {port}
+socket = "{source}"
 [journal]
 path = "{journal}"
+"""
+TOLD = """\
+mtm-onboard: robot0 plays channel robot1 of scheme robomaster-fleet (0123) with key fake-key: silence
+mtm-onboard: base commands come from the socket HERE/r.base and go to none
+mtm-onboard: to stop the robot: the datagram stop to the socket HERE/r.base; Ctrl-C ends the run
+mtm-onboard: the link is up
+mtm-onboard: no base command has come yet: the robot stands still
+mtm-onboard: base commands come from process N
 """
 
 
@@ -51,7 +55,7 @@ def key(tmp_path):
 
 
 def configure(folder: Path) -> None:
-    (folder / "robot.toml").write_text(CONFIG.format(port=PORT, journal=folder / "journal.csv"))
+    (folder / "robot.toml").write_text(CONFIG.format(source=folder / "r.base", journal=folder / "journal.csv"))
 
 
 def run(folder: Path, *options: str) -> int:
@@ -163,7 +167,8 @@ def test_a_run_to_a_message_s_end_sends_it_and_says_so(tmp_path, key, capsys):
     configure(tmp_path)
     assert run(tmp_path, "--message", "99", "--duration", "0.1") == 0
     assert re.fullmatch(
-        r"\d+ ticks sent, \d+ missed, \d+ over their period, 0 clamped, \d+ stale, 0 link losses, 0 commands refused, "
+        r"\d+ ticks sent, 0 unsent, \d+ missed, \d+ over their period, 0 clamped, \d+ stale, 0 link losses, "
+        r"0 times degraded, 0 commands refused, "
         r"late p50 [\d.]+ ms p99 [\d.]+ ms, journal .*journal.csv, 0 rows lost\n",
         capsys.readouterr().out,
     )
@@ -174,17 +179,27 @@ def test_a_run_to_a_message_s_end_sends_it_and_says_so(tmp_path, key, capsys):
     assert loaded.secret.hex() not in (tmp_path / "journal.csv").read_text()
 
 
-def test_robots_that_are_told_the_same_start_share_it_and_one_that_comes_late_joins_in_the_middle(tmp_path, key):
+def test_a_start_in_the_past_is_refused_before_anything_moves(tmp_path, key, capsys):
     configure(tmp_path)
-    started = time.time() - 5.0
-    assert run(tmp_path, "--message", "99", "--start-at", str(started), "--duration", "6") == 0
+    for start in (str(time.time() - 5.0), "5"):
+        assert run(tmp_path, "--message", "99", "--start-at", start) == 1
+        error = capsys.readouterr().err
+        assert "in the past" in error
+        assert error.count("\n") == 1
+    assert not (tmp_path / "journal.csv").exists()
+
+
+def test_robots_that_are_told_the_same_start_share_it(tmp_path, key):
+    configure(tmp_path)
+    start = time.time() + 1.0
+    assert run(tmp_path, "--message", "99", "--start-at", str(start), "--duration", "0.1") == 0
     record = read_journal(tmp_path / "journal.csv")
-    assert record.header.start_unix_s == pytest.approx(started)
-    assert 250 <= record.ticks[0] < 300
+    assert record.header.start_unix_s == pytest.approx(start)
+    assert record.ticks[0] < 0
 
 
 @pytest.mark.realtime
-def test_lines_on_standard_input_become_motion_with_the_message_on_it(tmp_path, key):
+def test_lines_on_standard_input_become_motion(tmp_path, key):
     configure(tmp_path)
     process = start(tmp_path, "--symbols", "3,1,0,2", "--stdin")
     assert process.stdin is not None
@@ -193,9 +208,10 @@ def test_lines_on_standard_input_become_motion_with_the_message_on_it(tmp_path, 
         process.stdin.flush()
         select.select([], [], [], 0.02)
     process.send_signal(signal.SIGTERM)
-    out, error = process.communicate(timeout=20)
-    assert (process.returncode, error) == (0, b"")
+    out, error = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0
     assert out.count(b"\n") == 1
+    assert all(line.startswith(b"mtm-onboard: ") for line in error.splitlines())
     assert noisy_ticks(tmp_path) > 0
     record = read_journal(tmp_path / "journal.csv")
     noisy = record.flags == NOISE
@@ -213,24 +229,30 @@ def noisy_ticks(folder: Path) -> int:
 
 
 @pytest.mark.realtime
-def test_an_interrupt_ends_a_run_on_a_controller_s_commands_with_nothing_wrong(tmp_path, key):
+def test_an_interrupt_ends_a_controller_s_run_with_nothing_wrong(tmp_path, key):
     configure(tmp_path)
     process = start(tmp_path, "--no-message")
-    client = BaseCommandClient(PORT)
+    client = BaseCommandClient(tmp_path / "r.base")
     journal = tmp_path / "journal.csv"
     while process.poll() is None and (not journal.exists() or b",0.2,0," not in journal.read_bytes()):
         client.send(BodyVelocity(0.2, 0.0, 0.1))
         select.select([], [], [], 0.02)
+    # As long as the run may take to say so.
+    for _ in range(20):
+        client.send(BodyVelocity(0.2, 0.0, 0.1))
+        select.select([], [], [], 0.02)
     process.send_signal(signal.SIGINT)
-    out, error = process.communicate(timeout=20)
+    out, error = process.communicate(timeout=PATIENCE_S)
     client.close()
-    assert (process.returncode, error) == (0, b"")
+    assert process.returncode == 0
     assert b"ticks sent" in out
+    told = re.sub(r"process \d+", "process N", error.decode().replace(str(tmp_path), "HERE"))
+    assert told.replace(load_key(key).scheme.fingerprint, "0123") == TOLD
     assert not np.any(read_journal(journal).flags & NOISE)
 
 
 @pytest.mark.realtime
-def test_a_run_outlives_its_key_file_and_its_journal_outlives_the_run(tmp_path, key):
+def test_a_journal_outlives_the_run_and_a_run_its_key_file(tmp_path, key):
     configure(tmp_path)
     process = start(tmp_path, "--symbols", "3,1,0,2", "--stdin")
     assert process.stdin is not None
@@ -245,13 +267,10 @@ def test_a_run_outlives_its_key_file_and_its_journal_outlives_the_run(tmp_path, 
         select.select([], [], [], 0.02)
     assert not key.exists()
     process.kill()
-    killed_s = SystemClock().now()
-    process.communicate(timeout=20)
+    process.communicate(timeout=PATIENCE_S)
     assert process.returncode == -signal.SIGKILL
     record = read_journal(tmp_path / "journal.csv")
     assert np.count_nonzero(record.flags == NOISE) >= wanted
-    # Written ten times a second; the rest is what a busy host may add.
-    assert killed_s - record.times_s[-1] < 1.0
 
 
 def test_a_journal_that_cannot_be_written_is_an_error(tmp_path, key, capsys):

@@ -1,3 +1,4 @@
+import importlib.util
 import shutil
 import subprocess
 import sys
@@ -13,18 +14,23 @@ pytestmark = pytest.mark.skipif(shutil.which("dpkg-deb") is None, reason="dpkg-d
 @pytest.fixture(scope="module")
 def package(tmp_path_factory):
     """The built package and the tree that it installs."""
-    subprocess.run([sys.executable, ROOT / "packaging/build_deb.py"], check=True, capture_output=True)
-    (built,) = (ROOT / "dist").glob("mtm-onboard_*_all.deb")
+    built = build(tmp_path_factory.mktemp("deb"))
     tree = tmp_path_factory.mktemp("tree")
     subprocess.run(["dpkg-deb", "--extract", built, tree], check=True)
     return built, tree
+
+
+def build(folder):
+    subprocess.run([sys.executable, ROOT / "packaging/build_deb.py", folder], check=True, capture_output=True)
+    (built,) = folder.glob("mtm-onboard_*_all.deb")
+    return built
 
 
 def field(built, name):
     return subprocess.run(["dpkg-deb", "-f", built, name], check=True, capture_output=True, text=True).stdout.strip()
 
 
-def test_it_is_for_every_architecture_and_takes_debians_own_libraries(package):
+def test_it_is_for_every_architecture_with_debians_libraries(package):
     built, _ = package
     assert field(built, "Architecture") == "all"
     assert {"python3-numpy", "python3-can", "python3-serial"} <= set(field(built, "Depends").split(", "))
@@ -46,11 +52,9 @@ def test_the_installed_program_starts(package):
     assert "keygen" in shown
 
 
-def test_the_same_commit_gives_the_same_bytes(package):
+def test_the_same_commit_gives_the_same_bytes(package, tmp_path):
     built, _ = package
-    first = built.read_bytes()
-    subprocess.run([sys.executable, ROOT / "packaging/build_deb.py"], check=True, capture_output=True)
-    assert built.read_bytes() == first
+    assert build(tmp_path).read_bytes() == built.read_bytes()
 
 
 def test_the_service_names_only_options_that_the_program_has(package):
@@ -75,3 +79,14 @@ def test_systemd_understands_the_units(package, unit):
         line for line in said.splitlines() if path.name.split("@")[0] in line and "not executable" not in line
     ]
     assert complaints == []
+
+
+@pytest.mark.parametrize(
+    ("earlier", "later"), [("1.2.dev3+gabc", "1.2"), ("1.2rc1", "1.2"), ("1.2.dev3", "1.2.dev12"), ("1.2", "1.3.dev1")]
+)
+def test_a_version_before_a_release_is_before_it_in_debian(earlier, later):
+    spec = importlib.util.spec_from_file_location("build_deb", ROOT / "packaging/build_deb.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    order = ["dpkg", "--compare-versions", module.debian_version(earlier), "lt", module.debian_version(later)]
+    assert subprocess.run(order).returncode == 0

@@ -52,7 +52,17 @@ def read_rollout(parameters: Values, seed: int) -> dict[str, Scalar]:
     symbols = tuple(int(symbol) for symbol in drawn)
     message_s = scheme.message_ticks / scheme.rate_hz
     seconds = ONSET_S + _LONGEST_MESSAGE * message_s + 0.1
-    longer = glimpses_of(RunSettings(key, symbols, seconds, seed, "direct", ONSET_S, plant=plant_of(parameters)))
+    longer = glimpses_of(
+        RunSettings(
+            key=key,
+            symbols=symbols,
+            seconds=seconds,
+            seed=seed,
+            wire="direct",
+            start_s=ONSET_S,
+            plant=plant_of(parameters),
+        )
+    )
     if parameters["detector"] == MATCHED:
         scores = _matched(key.codebook(), [until(ONSET_S + message_s, glimpse) for glimpse in longer])
     else:

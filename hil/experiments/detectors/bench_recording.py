@@ -69,7 +69,18 @@ def record(job: Job, plant: MecanumParameters, seed: int, modulator: ModulatorFa
     key = Key("bench", np.random.default_rng([_KEYS_STREAM, seed]).bytes(32), job.scheme)
     symbols = seeds_of(seed).permutation() if job.windows == 1 else _random_symbols(job, seed)
     seconds = ONSET_S + _LONGEST_MESSAGE * (job.end_s - ONSET_S) + 0.1
-    longer = glimpses_of(RunSettings(key, symbols, seconds, seed, "direct", ONSET_S, modulator, plant))
+    longer = glimpses_of(
+        RunSettings(
+            key=key,
+            symbols=symbols,
+            seconds=seconds,
+            seed=seed,
+            wire="direct",
+            start_s=ONSET_S,
+            modulator=modulator,
+            plant=plant,
+        )
+    )
     parts = channel_symbols(symbols, job.scheme)
     sent = np.array([parts[channel.name] for channel in job.scheme.channels])
     return Recording(key.codebook(), sent, tuple(until(job.end_s, glimpse) for glimpse in longer), longer)
@@ -78,7 +89,9 @@ def record(job: Job, plant: MecanumParameters, seed: int, modulator: ModulatorFa
 def record_silence(seconds: float, plant: MecanumParameters, seed: int) -> tuple[Glimpse, ...]:
     """Each robot's motion in the same task without a message."""
     key = Key("bench", bytes(32), fleet_scheme())
-    return glimpses_of(RunSettings(key, None, seconds, seed, "direct", 0.0, plant=plant))
+    return glimpses_of(
+        RunSettings(key=key, symbols=None, seconds=seconds, seed=seed, wire="direct", start_s=0.0, plant=plant)
+    )
 
 
 def _random_symbols(job: Job, seed: int) -> tuple[int, ...]:

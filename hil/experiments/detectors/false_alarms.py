@@ -100,9 +100,15 @@ def _recorded(played: Key, sent: tuple[int, ...] | None, seed: int, draw: np.ran
     length_s = float(draw.uniform(window_s, max(1.2 * window_s, most_s)))
     begin_s = float(draw.uniform(0.3, 8.0))
     settings = RunSettings(
-        played, sent, begin_s + length_s + 0.2, seed, wire="direct", start_s=0.2, task=random_task,
+        key=played,
+        symbols=sent,
+        seconds=begin_s + length_s + 0.2,
+        seed=seed,
+        wire="direct",
+        start_s=0.2,
+        task=random_task,
         plant=calibrated_parameters(),
-    )  # fmt: skip
+    )
     rate_hz, dropouts = float(draw.choice((25.0, 30.0, 50.0, 100.0))), float(draw.choice((0.0, 0.05)))
     system = MotionCapture(rate_hz=rate_hz, dropout_probability=dropouts)
     tracks = motion_capture_tracks(run_lockstep(settings), seed, system)
@@ -136,7 +142,13 @@ def _camera(draw: np.random.Generator) -> Optics:
     position_m = (across_m * math.cos(turn_rad), across_m * math.sin(turn_rad), distance_m * math.cos(tilt_rad))
     target_m = (float(draw.uniform(-0.5, 0.5)), float(draw.uniform(-0.5, 0.5)), 0.0)
     mirrored = bool(draw.random() < 0.5)
-    return Optics(position_m, target_m, _PIXELS_PER_M * distance_m, roll_rad=roll_rad, mirrored=mirrored)
+    return Optics(
+        position_m=position_m,
+        target_m=target_m,
+        focal_px=_PIXELS_PER_M * distance_m,
+        roll_rad=roll_rad,
+        mirrored=mirrored,
+    )
 
 
 def _observed_track(track: Track, camera: Optics, draw: np.random.Generator) -> Track:

@@ -21,7 +21,7 @@ from hil.plants.mecanum import MecanumParameters
 DECOYS = 10
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Row:
     """One line of the table; `messages` is None for the null conditions, `margin_error` a standard error."""
 
@@ -71,9 +71,9 @@ def _row(arm: str, ticks: int, results: Sequence[Values]) -> Row:
     error = float(np.std(margins, ddof=1) / np.sqrt(len(margins))) if len(margins) > 1 else float("nan")
     paper = {SENT: paper_figures.MESSAGE.get(ticks), WRONG_KEY: paper_figures.WRONG_KEY}.get(arm)
     return Row(
-        arm, ticks, len(results), Proportion(sum(correct), sum(decodes)),
-        Proportion(whole, len(results)) if arm == SENT else None,
-        float(np.mean(margins)), error, paper or paper_figures.NO_MESSAGE,
+        arm=arm, message_ticks=ticks, rollouts=len(results), symbols=Proportion(sum(correct), sum(decodes)),
+        messages=Proportion(whole, len(results)) if arm == SENT else None,
+        margin=float(np.mean(margins)), margin_error=error, paper=paper or paper_figures.NO_MESSAGE,
     )  # fmt: skip
 
 

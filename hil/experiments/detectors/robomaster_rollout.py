@@ -46,7 +46,9 @@ def decode_rollout(parameters: Values, seed: int) -> dict[str, Scalar]:
     symbols = seeds_of(seed).permutation()
     seconds = _START_S + _LONGEST_WINDOW * ticks / key.scheme.rate_hz + 0.1
     sent = None if arm == NO_MESSAGE else symbols
-    settings = RunSettings(key, sent, seconds, seed, wire="direct", start_s=_START_S, plant=plant)
+    settings = RunSettings(
+        key=key, symbols=sent, seconds=seconds, seed=seed, wire="direct", start_s=_START_S, plant=plant
+    )
     result = run_lockstep(settings)
     glimpses = [glimpse_of_track(track) for track in motion_capture_tracks(result, seed, MotionCapture())]
     codebooks = [key.codebook()]

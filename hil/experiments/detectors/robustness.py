@@ -58,9 +58,13 @@ class Condition:
 
 _TILT_RAD = np.deg2rad(50.0)
 _OBLIQUE = Optics(
-    (0.0, -7.5 * float(np.sin(_TILT_RAD)), 7.5 * float(np.cos(_TILT_RAD))), (0.0, 0.0, 0.0), focal_px=950.0,
-    width_px=1280, height_px=960, roll_rad=float(np.deg2rad(37.0)),
-)  # fmt: skip
+    position_m=(0.0, -7.5 * float(np.sin(_TILT_RAD)), 7.5 * float(np.cos(_TILT_RAD))),
+    target_m=(0.0, 0.0, 0.0),
+    focal_px=950.0,
+    width_px=1280,
+    height_px=960,
+    roll_rad=float(np.deg2rad(37.0)),
+)
 
 CONDITIONS: dict[str, Condition] = {
     "overhead": Condition(overhead()),
@@ -87,7 +91,15 @@ def read_under(parameters: Values, seed: int) -> dict[str, Scalar]:
     begin_s = _START_S - 1.0 if condition.start_known else _START_S + float(draw.uniform(0.2, 6.0))
     end_s = begin_s + 1.0 + (job.windows + (not condition.start_known)) * length_s
     sent = tuple(int(symbol) for symbol in symbols.ravel())
-    settings = RunSettings(key, sent, end_s + 0.2, seed, wire="direct", start_s=_START_S, plant=calibrated_parameters())
+    settings = RunSettings(
+        key=key,
+        symbols=sent,
+        seconds=end_s + 0.2,
+        seed=seed,
+        wire="direct",
+        start_s=_START_S,
+        plant=calibrated_parameters(),
+    )
     result = run_lockstep(settings)
     observations = [
         Observation(channel, glimpse_of_track(_observed_track(trajectory, condition, begin_s, end_s, draw)))

@@ -29,7 +29,7 @@ from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_onboard.journal.journal import DEFAULT_MAX_BYTES, Journal, JournalHeader
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.protocol import Channel, Key, MtmError, Scheme
 from mtm_onboard.protocol.journal_file import segments
@@ -46,15 +46,20 @@ SYMBOLS = (2, 0, 3)
 
 # Three windows of two seconds; whole messages to the day.
 _SCHEME = Scheme(
-    "endurance", 50.0, (0.5, 5.0), 4, 300, (Channel("robot0", "robot0", ("vx", "vy"), len(SYMBOLS), 0.1),),
+    name="endurance",
+    rate_hz=50.0,
+    band_hz=(0.5, 5.0),
+    alphabet_size=4,
+    message_ticks=300,
+    channels=(Channel("robot0", "robot0", ("vx", "vy"), len(SYMBOLS), 0.1),),
     schedule="rolling",
-)  # fmt: skip
+)
 _KEY = Key("endurance", b"simulated, so this is no secret.", _SCHEME)
 _MIDNIGHT_UNIX_S = 20_000.0 * EPOCH_S
 _FILM_SAMPLES = round(FILM_S / SAMPLE_PERIOD_S)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Checkpoint:
     """The state at `elapsed_s` of simulated time, and the message as decoded from the minute before.
 
@@ -123,11 +128,19 @@ class _Robot:
         self._plant = MecanumPlant(calibrated_parameters(), seed)
         ours, theirs = can_line()
         self._node = CanMotionController(MotionController(self._plant), theirs)
-        self._link = ReconnectingTransport(lambda: RoboMasterCan(ours), clock)
+        self._link = ReconnectingLink(lambda: RoboMasterCan(ours, clock=clock), clock)
         self._task = TASKS["orbit"](Route((0.0, 0.0), ()), seed)
         rate_hz = _SCHEME.rate_hz
         header = JournalHeader(
-            _SCHEME.fingerprint, _KEY.id, "robot0", "robot0", SYMBOLS, True, rate_hz, 0.0, begin_unix_s
+            fingerprint=_SCHEME.fingerprint,
+            key_id=_KEY.id,
+            robot="robot0",
+            channel="robot0",
+            symbols=SYMBOLS,
+            repeat=True,
+            rate_hz=rate_hz,
+            start_s=0.0,
+            start_unix_s=begin_unix_s,
         )
         self._journal = Journal(folder / "robot0.csv", header, threaded=False, max_bytes=journal_bytes)
         self._guard = Guard(LIMITS, Staleness(), noise_sigma=_SCHEME.channels[0].sigma, period_s=1.0 / rate_hz)
@@ -162,15 +175,15 @@ class _Robot:
         """The checkpoint without what is decoded from the film."""
         stats, guard, journal = self._stats, self._guard, self._journal
         return Checkpoint(
-            elapsed_s=self._clock.now(), ticks=stats.sent, missed=stats.missed, clamped=guard.clamped,
+            elapsed_s=self._clock.now(), ticks=stats.sent + stats.unsent, missed=stats.missed, clamped=guard.clamped,
             disturbed=guard.stale + guard.refused + guard.held + guard.unsent, faults=self._faults(),
             resident_bytes=_resident_bytes(), journal_lost=journal.lost,
             journal_bytes=sum(part.stat().st_size for part in segments(journal.path)), cpu_s=time.process_time(),
         )  # fmt: skip
 
-    def _step(self, tick: int, now_s: float) -> None:
+    def _step(self, tick: int, now_s: float, late_s: float) -> bool:
         self._source.set(self._task.command(self._plant.position_xy_m, self._plant.heading_rad), now_s)
-        self._runtime.step(tick, now_s)
+        return self._runtime.step(tick, now_s, late_s)
 
     def _poll(self, now_s: float) -> None:
         self._node.poll(now_s)

@@ -21,13 +21,13 @@ from hil.vehicles.mavlink_vehicle import MavlinkVehicle
 from hil.vehicles.motion_controller import DEADMAN_S, MotionController
 from hil.vehicles.plaintext_node import PlaintextMotionController
 from hil.wires.faulty_wire import FaultyBus, FaultyPort, FaultyText, FaultyTextPort, FaultyWire, WireFaults
-from hil.wires.plaintext_line import LineTransport
+from hil.wires.plaintext_line import LineLink
 from hil.worlds.robomaster import Route
 from hil.worlds.tasks import TASKS
 from mtm_onboard.journal.journal import Journal, JournalHeader
-from mtm_onboard.links.base import Transport
-from mtm_onboard.links.mavlink import MavlinkTransport
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.base import Link
+from mtm_onboard.links.mavlink import MavlinkLink
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import Key, MtmError
@@ -90,17 +90,17 @@ class _End:
     """The robot's end of a wire, and a factory of our end."""
 
     poll: Callable[[float], None]
-    make: Callable[[], Transport]
+    make: Callable[[], Link]
 
 
 def run_fault(
-    wire_name: str, fault: Fault, loss: str, key: Key, symbols: tuple[int, ...], seed: int, folder: Path
+    wire_name: str, fault: Fault, loss: str, key: Key, symbols: tuple[int, ...], *, seed: int, folder: Path
 ) -> FaultRun:
     """The record of one run; `loss` is "", "cut" or "swallowed", and the journal is written into `folder`."""
     clock = SimulatedClock()
     wire, plant = FaultyWire(clock, seed), _ImpairedPlant(seed)
     end = _end(wire_name, wire, plant, clock)
-    link = ReconnectingTransport(end.make, clock)
+    link = ReconnectingLink(end.make, clock)
     motion: list[tuple[float, float, float]] = []
 
     def poll(now_s: float) -> None:
@@ -136,7 +136,7 @@ class _Ticks:
     """The onboard program: the runtime, and a controller whose base commands end at `SILENT_S`."""
 
     def __init__(
-        self, key: Key, symbols: tuple[int, ...], link: Transport, journal: Journal, plant: MecanumPlant, seed: int
+        self, key: Key, symbols: tuple[int, ...], link: Link, journal: Journal, plant: MecanumPlant, seed: int
     ) -> None:
         channel, rate_hz = key.scheme.channels[0], key.scheme.rate_hz
         self._source = HeldSource()
@@ -162,7 +162,15 @@ class _Ticks:
 def _header(key: Key, symbols: tuple[int, ...]) -> JournalHeader:
     scheme = key.scheme
     return JournalHeader(
-        scheme.fingerprint, key.id, "robot0", scheme.channels[0].name, symbols, True, scheme.rate_hz, START_S, None
+        fingerprint=scheme.fingerprint,
+        key_id=key.id,
+        robot="robot0",
+        channel=scheme.channels[0].name,
+        symbols=symbols,
+        repeat=True,
+        rate_hz=scheme.rate_hz,
+        start_s=START_S,
+        start_unix_s=None,
     )
 
 
@@ -185,12 +193,12 @@ def _not_reentrant(service: Callable[[float], None]) -> Callable[[float], None]:
 def _end(name: str, wire: FaultyWire, plant: MecanumPlant, clock: SimulatedClock) -> _End:
     if name == "can":
         node = CanMotionController(MotionController(plant, DEADMEN_S[name]), FaultyBus(wire, is_robot=True))
-        return _End(node.poll, lambda: RoboMasterCan(FaultyBus(wire, is_robot=False)))
+        return _End(node.poll, lambda: RoboMasterCan(FaultyBus(wire, is_robot=False), clock=clock))
     if name == "plaintext":
         server = PlaintextMotionController(MotionController(plant, DEADMEN_S[name]), [FaultyTextPort(wire)])
-        return _End(server.poll, lambda: LineTransport(FaultyText(wire)))
+        return _End(server.poll, lambda: LineLink(FaultyText(wire)))
     vehicle = MavlinkVehicle(COPTER, plant, FaultyPort(wire, is_robot=True), is_guided=True, is_armed=True)
     return _End(
         vehicle.poll,
-        lambda: MavlinkTransport(profile="copter", clock=clock, open_port=lambda: FaultyPort(wire, is_robot=False)),
+        lambda: MavlinkLink(profile="copter", clock=clock, open_port=lambda: FaultyPort(wire, is_robot=False)),
     )

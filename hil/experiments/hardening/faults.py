@@ -60,7 +60,7 @@ _SAME = 2e-4  # above what plaintext rounds off, in m/s and rad/s
 _MOSTLY = 0.75
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
     """The measurements of one run; ages and times in seconds.
 
@@ -85,7 +85,7 @@ class Outcome:
     p_value: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Row:
     """One row of the matrix: an outcome and its deadlines; `lost_deadline_s` None for a robot without a deadman."""
 
@@ -136,8 +136,8 @@ def fault_cell(parameters: Values, seed: int) -> dict[str, Scalar]:
     key = Key("faults", draw.bytes(32), scheme)
     with tempfile.TemporaryDirectory() as folder:
         run = run_fault(
-            str(parameters["wire"]), FAULTS[str(parameters["fault"])], str(parameters["loss"]), key, _SYMBOLS, seed,
-            Path(folder),
+            str(parameters["wire"]), FAULTS[str(parameters["fault"])], str(parameters["loss"]), key, _SYMBOLS,
+            seed=seed, folder=Path(folder),
         )  # fmt: skip
     return assess(run, bool(parameters["loss"]), FAULTS[str(parameters["fault"])].most) | _decoded(run, key, draw)
 
@@ -149,9 +149,14 @@ def row_of(cell: Cell, result: Values) -> Row:
     deadman_s = DEADMEN_S[wire]
     outcome = Outcome(**result)  # type: ignore[arg-type]
     return Row(
-        wire, fault, loss, cell.seed, outcome, STALE_S + GRACE_S + late_s,
-        None if deadman_s is None else deadman_s + GRACE_S + late_s,
-    )  # fmt: skip
+        wire=wire,
+        fault=fault,
+        loss=loss,
+        seed=cell.seed,
+        outcome=outcome,
+        silent_deadline_s=STALE_S + GRACE_S + late_s,
+        lost_deadline_s=None if deadman_s is None else deadman_s + GRACE_S + late_s,
+    )
 
 
 def assess(run: FaultRun, is_lost: bool, most: float = np.inf) -> dict[str, Scalar]:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hil.experiments.hardening.fuzz_traffic import signing_time
-from hil.fleet.clock import SimulatedClock
+from hil.fleet.clock import AnsweringClock, SimulatedClock
 from hil.plants.mecanum import MecanumPlant, calibrated_parameters
 from hil.vehicles.can_node import CanMotionController
 from hil.vehicles.mavlink_firmware import COPTER
@@ -13,12 +13,12 @@ from hil.vehicles.motion_controller import MotionController
 from hil.vehicles.plaintext_node import PlaintextMotionController
 from hil.wires.byte_pipe import PipeEnd
 from hil.wires.can_line import LineEnd
-from hil.wires.plaintext_line import LineTransport
+from hil.wires.plaintext_line import LineLink
 from hil.wires.plaintext_ports import Port
-from mtm_onboard.links.byte_link import ByteLink
+from mtm_onboard.links.byte_stream import ByteStream
 from mtm_onboard.links.can_stream import CanStream
 from mtm_onboard.links.duml import Message, encode
-from mtm_onboard.links.mavlink import MavlinkTransport
+from mtm_onboard.links.mavlink import MavlinkLink
 from mtm_onboard.links.mavlink_profiles import PROFILES, Profile
 from mtm_onboard.links.mavlink_state import VehicleState
 from mtm_onboard.links.robomaster_can import RoboMasterCan
@@ -66,10 +66,13 @@ class CanNodeListener(CanMotionController):
 
 
 class CanLinkListener(RoboMasterCan):
-    """The transport on the CAN bus."""
+    """The link on the CAN bus, opened with a robot that answers at `far_end`; reports what comes after that."""
 
-    def __init__(self, bus: LineEnd, on_message: OnMessage) -> None:
-        super().__init__(bus)
+    def __init__(self, bus: LineEnd, far_end: LineEnd, on_message: OnMessage) -> None:
+        robot = CanMotionController(idle_controller(), far_end)
+        super().__init__(bus, clock=AnsweringClock(SimulatedClock(), robot.poll))
+        self._on_message: OnMessage = lambda _: None
+        self.open()
         self._on_message = on_message
 
     @property
@@ -96,10 +99,10 @@ class PlaintextNodeListener(PlaintextMotionController):
             self._on_message(as_text(text) + b";")
 
 
-class PlaintextLinkListener(LineTransport):
+class PlaintextLinkListener(LineLink):
     """Our end of the plaintext line; reports the texts that are not malformed."""
 
-    def __init__(self, link: ByteLink, on_message: OnMessage) -> None:
+    def __init__(self, link: ByteStream, on_message: OnMessage) -> None:
         super().__init__(link)
         self._on_message = on_message
 
@@ -123,8 +126,8 @@ class VehicleListener(MavlinkVehicle):
         super()._take(message, now_s)
 
 
-class MavlinkLinkListener(MavlinkTransport):
-    """The MAVLink transport."""
+class MavlinkLinkListener(MavlinkLink):
+    """The MAVLink link."""
 
     def __init__(self, port: PipeEnd, clock: SimulatedClock, on_message: OnMessage) -> None:
         super().__init__(profile="copter", clock=clock, open_port=lambda: port)

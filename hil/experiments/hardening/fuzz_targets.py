@@ -34,8 +34,8 @@ from hil.fleet.clock import SimulatedClock
 from hil.wires.byte_pipe import PipeEnd, byte_pipe
 from hil.wires.can_line import LineEnd, can_line
 from hil.wires.plaintext_ports import LinePort
-from mtm_onboard.links.base import Transport
-from mtm_onboard.links.byte_link import ByteLink
+from mtm_onboard.links.base import Link
+from mtm_onboard.links.byte_stream import ByteStream
 from mtm_onboard.links.duml import MAX_LENGTH
 from mtm_onboard.links.mavlink_codec import MavlinkCodec
 from mtm_onboard.links.mavlink_messages import COMPANION_COMPONENT, companion_heartbeat
@@ -152,8 +152,7 @@ class CanLink(_Can):
     def __init__(self) -> None:
         feeder, end = can_line()
         super().__init__(can_from_robot(), feeder)
-        self._link = CanLinkListener(end, self.accepted.append)
-        self._link.open()
+        self._link = CanLinkListener(end, feeder, self.accepted.append)
 
     @property
     def failed_checks(self) -> int:
@@ -200,7 +199,7 @@ class PlaintextLink(_Plaintext):
     def _connect(self) -> None:
         ours, theirs = socket.socketpair()
         self._port = LinePort(theirs.detach())
-        self._link = PlaintextLinkListener(ByteLink(ours.detach()), self.accepted.append)
+        self._link = PlaintextLinkListener(ByteStream(ours.detach()), self.accepted.append)
         self._link.open()
 
     def _arrive(self, draw: random.Random, data: bytes) -> None:
@@ -292,7 +291,7 @@ TARGETS: dict[str, Callable[[], Target]] = {
 }
 
 
-def _use(link: Transport, now_s: float) -> bool:
+def _use(link: Link, now_s: float) -> bool:
     """Read, and send a command; False when the link says that it is lost or taken over."""
     link.service(now_s)
     try:

@@ -147,7 +147,13 @@ def _sealed_duml(draw: random.Random, message: bytes) -> bytes:
     attributes = draw.choice((plain.attributes, draw.randrange(256)))
     return duml.encode(
         duml.Message(
-            plain.sender, plain.receiver, draw.randrange(65_536), attributes, plain.cmdset, plain.cmdid, payload
+            sender=plain.sender,
+            receiver=plain.receiver,
+            sequence=draw.randrange(65_536),
+            attributes=attributes,
+            cmdset=plain.cmdset,
+            cmdid=plain.cmdid,
+            payload=payload,
         )
     )
 

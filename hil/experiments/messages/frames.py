@@ -43,7 +43,7 @@ _ATTACK_BITS = 32
 _CLEAN_NATS = 20.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Row:
     """One row of the table: what was done to frames of this kind, and how often which payload was read.
 
@@ -97,9 +97,16 @@ def row_of(cells: Sequence[Cell], results: Sequence[Values]) -> Row:
         sum(int(result[name]) for result in results) for name in ("frames", "right", "wrong", "tries")
     )
     return Row(
-        str(asked["what"]), str(asked["code"]), str(asked["check"]), int(asked["check_bits"]),
-        float(asked["distance"]), frames, right, wrong, tries,
-    )  # fmt: skip
+        what=str(asked["what"]),
+        code=str(asked["code"]),
+        check=str(asked["check"]),
+        check_bits=int(asked["check_bits"]),
+        distance=float(asked["distance"]),
+        frames=frames,
+        right=right,
+        wrong=wrong,
+        tries=tries,
+    )
 
 
 def read_frames(parameters: Values, seed: int) -> dict[str, Scalar]:
@@ -113,7 +120,7 @@ def read_frames(parameters: Values, seed: int) -> dict[str, Scalar]:
         sent = (_frame(draw), _frame(draw))
         epoch = int(draw.integers(1, 2**16))
         if what in ATTACKS:
-            symbols = _attacked(what, sent, scheme, secret, epoch, draw, seed * _FRAMES_A_CELL + row)
+            symbols = _attacked(what, sent, scheme, secret, epoch, draw=draw, variant=seed * _FRAMES_A_CELL + row)
             ratios: Floats = np.zeros((scheme.message_symbols, _ALPHABET))
             ratios[np.arange(len(symbols)), symbols] = _CLEAN_NATS
             genuine: tuple[Frame, ...] = {"spliced": sent, "changed symbol": sent[:1]}.get(what, ())
@@ -140,10 +147,20 @@ def noisy_ratios(symbols: NDArray[np.int64], distance: float, draw: np.random.Ge
 
 
 def _scheme(code: str, check: str, check_bits: int) -> Scheme:
-    framing = Framing("integer", 12, 4, cast(CheckKind, check), check_bits, cast(CodeKind, code))
+    framing = Framing(
+        "integer", 12, number_bits=4, check=cast(CheckKind, check), check_bits=check_bits, code=cast(CodeKind, code)
+    )
     count = _CODED_SYMBOLS if code != "none" else framing.data_bits // 2
     channel = Channel("robot", "robot", ("vx", "vy"), count, 0.1)
-    return Scheme("frames", 50.0, (1.0, 20.0), _ALPHABET, 20 * count, (channel,), framing=framing)
+    return Scheme(
+        name="frames",
+        rate_hz=50.0,
+        band_hz=(1.0, 20.0),
+        alphabet_size=_ALPHABET,
+        message_ticks=20 * count,
+        channels=(channel,),
+        framing=framing,
+    )
 
 
 def _frame(draw: np.random.Generator) -> Frame:
@@ -160,6 +177,7 @@ def _attacked(
     scheme: Scheme,
     secret: bytes,
     epoch: int,
+    *,
     draw: np.random.Generator,
     variant: int,
 ) -> NDArray[np.int64]:

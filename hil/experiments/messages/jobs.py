@@ -84,12 +84,18 @@ def receive(parameters: Values, seed: int) -> dict[str, Scalar]:
     onset_s = slot_start_unix_s(next_slot(unix_s + _LEAD_S, fleet), fleet) - unix_s
     end_s = onset_s + job.repetitions * job.message_s + _TAIL_S
     settings = RunSettings(
-        Key("fleet", bytes(32), fleet), _silence(fleet), end_s + 0.1, seed, wire="direct", start_s=_LEAD_S,
-        unix_s=unix_s, plant=calibrated_parameters(),
+        key=Key("fleet", bytes(32), fleet),
+        symbols=_silence(fleet),
+        seconds=end_s + 0.1,
+        seed=seed,
+        wire="direct",
+        start_s=_LEAD_S,
+        unix_s=unix_s,
+        plant=calibrated_parameters(),
         modulator=lambda codebook, name, _: Modulator(
             keys[name].codebook(codebook.first_slot), name, message_of(payloads[name], keys[name])
         ),
-    )  # fmt: skip
+    )
     tracks = motion_capture_tracks(run_lockstep(settings), seed, MotionCapture())
     robot = seed % ROBOTS
     name = fleet.channels[robot].name

@@ -18,7 +18,7 @@ SAME, SPLIT = "same", "split"
 _PAPER_CSV = Path(__file__).with_name("paper_worlds.csv")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Point:
     """A scheme in a world and how many goals a rollout pursues under it.
 
@@ -94,9 +94,14 @@ def paper_entries(world: str) -> tuple[PaperEntry, ...]:
 
 def _paper_entry(row: Mapping[str, str]) -> PaperEntry:
     point = Point(
-        row["world"], row["arrangement"], int(row["alphabet_size"]), int(row["message_ticks"]), row["symbols"],
-        int(row["goals"]), row["whole"] == "yes",
-    )  # fmt: skip
+        world=row["world"],
+        arrangement=row["arrangement"],
+        alphabet_size=int(row["alphabet_size"]),
+        message_ticks=int(row["message_ticks"]),
+        symbols=row["symbols"],
+        goals=int(row["goals"]),
+        whole=row["whole"] == "yes",
+    )
     return PaperEntry(point, float(row["percent"]), float(row["error"] or "nan"), float(row["margin"] or "nan"))
 
 
@@ -123,4 +128,11 @@ def headline_point(world: str, ticks: int | None = None) -> Point:
     """The headline point, or the same scheme with shorter messages; one symbol is a goal in all of them."""
     headline = HEADLINES[world]
     goals = 1 if world == "football" else 8
-    return Point(world, headline.arrangement, headline.alphabet_size, ticks or headline.message_ticks, "1", goals)
+    return Point(
+        world=world,
+        arrangement=headline.arrangement,
+        alphabet_size=headline.alphabet_size,
+        message_ticks=ticks or headline.message_ticks,
+        symbols="1",
+        goals=goals,
+    )

@@ -69,7 +69,7 @@ class Condition:
     medium: str = MEMORY
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Row:
     """What one detector has right at one point.
 
@@ -194,12 +194,23 @@ def _rows(world: str, condition: Condition, results: dict[str, list[float]]) -> 
         symbols = Proportion(int(sum(own["symbols"])), trials * point.goal_symbols)
         margin = sum(own["margin"]) / condition.rollouts
         if condition.arm == NO_MESSAGE:
-            yield Row(arm, point, detector, condition.rollouts, None, symbols)
+            yield Row(arm=arm, point=point, detector=detector, rollouts=condition.rollouts, goals=None, symbols=symbols)
             continue
         goals = Proportion(int(sum(own["goals"])), trials)
         reported = paper.get(point) if arm == SENT else None
-        yield Row(arm, point, detector, condition.rollouts, goals, symbols, margin, reported)
+        yield Row(
+            arm=arm,
+            point=point,
+            detector=detector,
+            rollouts=condition.rollouts,
+            goals=goals,
+            symbols=symbols,
+            margin=margin,
+            paper=reported,
+        )
         if f"{detector} {arrangement} wrong" in results:
             wrong = int(sum(results[f"{detector} {arrangement} wrong"]))
             tried = Proportion(wrong, symbols.trials * condition.decoys)
-            yield Row(WRONG_KEY, point, detector, condition.rollouts, None, tried)
+            yield Row(
+                arm=WRONG_KEY, point=point, detector=detector, rollouts=condition.rollouts, goals=None, symbols=tried
+            )

@@ -11,7 +11,6 @@ as TOML:
 """
 
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,11 +21,11 @@ from mtm_audit.detectors.matched.plants import FINE, Plants
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.input_file import BrokenTextError, parsed_toml, read_text
 
 PROFILE_FORMAT = 2
 # The next robot of the type is another one, with another load on another floor.
 _TRUST = 0.9
-_LARGEST_FILE = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -52,9 +51,9 @@ def log_prior(profile: PlantProfile | None, plants: Plants) -> Floats:
 
 
 def profile_text(profile: PlantProfile) -> str:
-    """The profile file's text."""
+    """The profile file's text; weights to their last bit, so that the file gives back what was learnt."""
     rows = [
-        f"    {{delay_s = {delay_s:.4g}, lag_s = {lag_s:.4g}, return_s = {return_s:.4g}, weight = {weight:.6f}}},"
+        f"    {{delay_s = {delay_s:.4g}, lag_s = {lag_s:.4g}, return_s = {return_s:.4g}, weight = {float(weight)!r}}},"
         for delay_s, lag_s, return_s, weight in zip(
             FINE.delays_s, FINE.lags_s, FINE.returns_s, profile.weights, strict=True
         )
@@ -108,10 +107,6 @@ def _weight(path: Path, row: Any, number: int) -> float:
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        with path.open("rb") as file:
-            text = file.read(_LARGEST_FILE)
-        return tomllib.loads(text.decode("utf-8"))
-    except OSError as error:
-        raise MtmError(f"cannot read the profile {path}: {error.strerror}; check the name") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        return parsed_toml(read_text(path, "the profile"))
+    except BrokenTextError as error:
         raise MtmError(f"{path} is no profile; name a file that mtm-audit profile wrote") from error

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.framing.framing import Layout
 from mtm_onboard.protocol.framing.galois import PRIMITIVE_POLYNOMIALS, parity_of
+from mtm_onboard.protocol.installing import install_command
 
 if TYPE_CHECKING:
     from reedsolo import RSCodec
@@ -75,7 +76,8 @@ def _codec(layout: Layout) -> RSCodec:
         from reedsolo import RSCodec
     except ImportError as error:
         raise MtmError(
-            "correcting a Reed-Solomon code needs the package reedsolo; install it with: pip install 'mtm[rs]'"
+            "correcting a Reed-Solomon code needs reedsolo, which is not installed; install it with: "
+            f"{install_command('audit')}"
         ) from error
     # Made anew each time: its kind of array too is the module's, and follows the codec that was made last.
     return RSCodec(

@@ -1,6 +1,6 @@
 """How a message is framed: which bits stand beside the payload, and how they fill the symbols."""
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Literal, get_args
 
 from mtm_onboard.protocol.errors import MtmError
@@ -33,6 +33,7 @@ class Framing:
 
     payload: PayloadKind
     payload_bits: int
+    _: KW_ONLY
     number_bits: int = 0
     check: CheckKind = "none"
     check_bits: int = 0

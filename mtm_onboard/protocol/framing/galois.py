@@ -29,22 +29,23 @@ def parity_of(data: Sequence[int], parity: int, field_bits: int) -> list[int]:
         if feedback:
             shift = logarithms[feedback]
             for place, coefficient in enumerate(generator):
-                if coefficient:
-                    remainder[place] ^= powers[shift + logarithms[coefficient]]
+                remainder[place] ^= powers[shift + logarithms[coefficient]]
     return remainder
 
 
 @lru_cache(maxsize=4)
 def _generator(parity: int, field_bits: int) -> tuple[int, ...]:
-    """Coefficients of the generator polynomial, highest power first, without the leading one."""
+    """Coefficients of the generator polynomial, highest power first, without the leading one.
+
+    None is zero: the generator is a codeword, and those of `parity` symbols differ in more places than that.
+    """
     powers, logarithms = _tables(field_bits)
     generator = [1]
     for root in range(parity):
         # Times (x + alpha ** root).
         product = [*generator, 0]
         for place, coefficient in enumerate(generator):
-            if coefficient:
-                product[place + 1] ^= powers[logarithms[coefficient] + root % ((1 << field_bits) - 1)]
+            product[place + 1] ^= powers[logarithms[coefficient] + root]
         generator = product
     return tuple(generator[1:])
 

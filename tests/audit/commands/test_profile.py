@@ -71,7 +71,7 @@ def test_a_folder_that_is_not_there_is_refused_before_the_work(audit, tmp_path):
 @pytest.mark.parametrize(
     ("text", "sentence"), [(None, "cannot read the profile"), ("format = 7\n", "profile format 7")]
 )
-def test_a_profile_that_cannot_be_used_is_refused_in_one_sentence(audit, folder, tmp_path, text, sentence):
+def test_an_unusable_profile_is_refused_in_one_sentence(audit, folder, tmp_path, text, sentence):
     path = tmp_path / "robot.profile"
     if text is not None:
         path.write_text(text, encoding="utf-8")

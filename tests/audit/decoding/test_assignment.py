@@ -51,7 +51,7 @@ def test_a_recording_without_tracks_is_refused():
         assign_tracks(FLEET, [])
 
 
-def test_more_pairs_than_can_be_searched_are_refused_with_the_way_out():
+def test_more_pairs_than_can_be_searched_are_refused():
     strangers = tracks(*(f"shape {letter}" for letter in "abcdefghijklmnopqrstuvwxyz"))
     many = scheme_of(symbols=(1,) * (MOST_PAIRS // len(strangers) + 1))
     with pytest.raises(MtmError, match="8 bodies and 26 tracks .*, 208 pairs, .*--assign BODY=TRACK"):
@@ -59,7 +59,7 @@ def test_more_pairs_than_can_be_searched_are_refused_with_the_way_out():
     assert assign_tracks(many, strangers, {"robot0": "shape a"}).unsettled == tuple(f"robot{n}" for n in range(1, 8))
 
 
-def test_a_choice_of_what_does_not_exist_is_refused_with_what_does():
+def test_a_choice_of_what_does_not_exist_is_refused():
     with pytest.raises(MtmError, match="no track 'green'; it has: red"):
         assign_tracks(FLEET, tracks("red"), {"robot0": "green"})
     with pytest.raises(MtmError, match="no body 'arm'; its bodies are: robot0, robot1, robot2"):

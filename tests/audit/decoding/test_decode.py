@@ -55,7 +55,7 @@ def test_the_wrong_key_finds_nothing_however_long_it_searches():
 
 
 @pytest.mark.parametrize("late_s", [1e5, 1e300])
-def test_a_recording_that_is_far_too_long_is_refused_before_the_search(late_s):
+def test_a_far_too_long_recording_is_refused_before_the_search(late_s):
     tracks = tuple(replace(track, times_s=np.append(track.times_s[:-1], late_s)) for track in pair())
     with pytest.raises(MtmError, match="no more than 10000 s can be searched; .*seconds"):
         decode_tracks(tracks, PAIR, DecodeSettings(detector="coherency", decoys=8))
@@ -78,7 +78,7 @@ def test_robots_that_send_nothing_give_absent(onset_s):
     assert (decoding.verdict, decoding.message) == ("absent", None)
 
 
-def test_a_robot_that_is_not_in_the_recording_leaves_the_message_open():
+def test_a_robot_not_in_the_recording_leaves_the_message_open():
     decoding = decode_tracks(pair()[:1], PAIR, KNOWN)
     assert (decoding.verdict, decoding.message) == ("inconclusive", None)
     assert decoding.symbols == (3, None)
@@ -121,7 +121,7 @@ def test_a_pooled_message_survives_a_missing_robot(pooling):
     assert decode_tracks(tracks, key, KNOWN).symbols == (2,)
 
 
-def test_a_recording_that_starts_in_the_middle_of_a_message_is_read_all_the_same():
+def test_a_recording_from_the_middle_of_a_message_is_read():
     key = key_of(scheme_of(symbols=(1, 1), ticks=400))
     tracks = [robot_track(key, f"robot{n}", (SENT[n],), 21.0, onset_s=-5.0, seed=n) for n in range(2)]
     decoding = decode_tracks(tracks, key, DecodeSettings(detector="coherency", decoys=30))
@@ -131,7 +131,7 @@ def test_a_recording_that_starts_in_the_middle_of_a_message_is_read_all_the_same
 SEVERAL = key_of(scheme_of(symbols=(2,), ticks=600))
 
 
-def test_a_repeated_message_whose_beginning_nobody_saw_is_not_put_together():
+def test_a_repeated_message_of_unseen_beginning_is_not_joined():
     """3 1 3 1 3 is the message 3 1 or the message 1 3: neither may be called decoded."""
     track = robot_track(SEVERAL, "robot0", (3, 1), 26.0, onset_s=-4.0)
     decoding = decode_tracks([track], SEVERAL, DecodeSettings(detector="coherency", decoys=30))
@@ -139,13 +139,13 @@ def test_a_repeated_message_whose_beginning_nobody_saw_is_not_put_together():
     assert (decoding.verdict, decoding.message, decoding.order_known) == ("inconclusive", None, False)
 
 
-def test_a_repeated_message_is_put_together_when_its_beginning_is_given():
+def test_a_repeated_message_of_given_beginning_is_joined():
     track = robot_track(SEVERAL, "robot0", (3, 1), 26.0, onset_s=-4.0)
     decoding = decode_tracks([track], SEVERAL, DecodeSettings(detector="coherency", onset_s=8.0, decoys=30))
     assert (decoding.verdict, decoding.symbols) == ("decoded", (3, 1))
 
 
-def test_a_message_of_several_symbols_that_is_sent_once_needs_no_onset():
+def test_several_symbols_sent_once_need_no_onset():
     track = robot_track(SEVERAL, "robot0", (3, 1), 14.0, onset_s=1.0)
     decoding = decode_tracks([track], SEVERAL, DecodeSettings(detector="coherency", decoys=30))
     assert (decoding.verdict, decoding.symbols) == ("decoded", (3, 1))
@@ -247,7 +247,7 @@ def test_named_tracks_are_settled_before_the_search():
     assert [item.searched for item in decoding.channels] == [False, True, True]
 
 
-def test_the_strength_is_the_mean_of_the_channels_whichever_tracks_were_searched():
+def test_the_strength_is_the_mean_of_the_channels():
     for tracks in (strangers(), (*strangers()[:2], replace(strangers()[2], name="robot1"))):
         decoding = decode_tracks(tracks, FLEET, replace(KNOWN, decoys=8))
         shown = [item.reading.strength for item in decoding.channels if item.reading is not None]
@@ -261,7 +261,7 @@ def test_tracks_too_short_to_match_are_refused_in_a_sentence():
         decode_tracks([Track("dot", np.zeros(1), np.zeros((1, 2)), np.ones(1, bool))], PAIR, KNOWN)
 
 
-def test_evidence_in_bits_is_what_the_p_value_says_unless_it_is_a_log_evidence():
+def test_evidence_in_bits_is_what_the_p_value_says():
     by_coherency = decode_tracks(pair(), PAIR, KNOWN)
     assert by_coherency.evidence.nats is None
     assert by_coherency.evidence.bits == pytest.approx(-np.log2(by_coherency.evidence.p_value))
@@ -301,7 +301,7 @@ def test_any_number_comes_back(number):
     assert decode_tracks(pair(symbols), PAIR, KNOWN).message == number
 
 
-def test_a_position_that_nothing_can_have_is_refused_before_it_spoils_the_sums():
+def test_an_impossible_position_is_refused_before_the_sums():
     with pytest.raises(MtmError, match="beyond 1e\\+09 m"):
         Track("robot0", np.arange(3.0), np.array([[0.0, 0.0], [1e300, 0.0], [0.0, 0.0]]), np.ones(3, bool))
 
@@ -309,7 +309,7 @@ def test_a_position_that_nothing_can_have_is_refused_before_it_spoils_the_sums()
 @pytest.mark.parametrize(
     ("p_value", "looks"), [(0.5, [30]), (0.011, [30]), (0.009, [30, 150]), (0.0002, [30, 150]), (0.00009, [30])]
 )
-def test_evidence_near_the_limit_is_judged_by_more_decoys_and_only_then(monkeypatch, p_value, looks):
+def test_evidence_near_the_limit_gets_more_decoys_and_only_then(monkeypatch, p_value, looks):
     found = decode_tracks(pair(), PAIR, KNOWN)
     tried = []
 

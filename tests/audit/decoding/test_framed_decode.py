@@ -37,7 +37,7 @@ def test_a_tagged_frame_is_authenticated():
     assert "had the key" in frame_sentences(decoding)[0]
 
 
-def test_the_tag_finds_the_first_symbol_of_a_message_that_repeats():
+def test_the_tag_finds_the_first_symbol_of_a_repeated_message():
     decoding = decode_tracks(tracks(onset_s=-3.2), KEY, SETTINGS)
     assert (decoding.verdict, decoding.message) == ("decoded", 1234)
 

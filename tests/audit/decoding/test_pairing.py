@@ -11,7 +11,7 @@ from mtm_onboard.protocol import Channel
 ONE_EACH = np.arange(2)
 
 
-def test_the_best_choice_is_not_always_that_of_the_strongest_pair():
+def test_the_best_choice_may_leave_out_the_strongest_pair():
     strengths = np.array([[[5.0, 4.0], [4.5, 0.0]]])
     chosen, sums = choose_pairs(strengths, ONE_EACH)
     assert chosen.tolist() == [[1, 0]]
@@ -25,7 +25,7 @@ def test_each_codebook_chooses_for_itself():
     assert sums.tolist() == [2.0, 4.0]
 
 
-def test_a_weak_pair_that_can_be_read_comes_before_a_strong_one_alone():
+def test_a_weak_readable_pair_comes_before_a_strong_one_alone():
     strengths = np.array([[[9.0, -5.0], [-7.0, np.nan]]])
     chosen, sums = choose_pairs(strengths, ONE_EACH)
     assert chosen.tolist() == [[1, 0]]

@@ -64,7 +64,7 @@ def test_a_rolling_schedule_plays_new_waveforms_in_every_window():
     assert np.argmax(reading.window_scores, axis=1).tolist() == [1, 1]
 
 
-def test_posteriors_are_sure_of_what_was_sent_and_unsure_of_chance(glimpse):
+def test_posteriors_are_sure_of_what_was_sent_not_of_chance(glimpse):
     detector = CoherencyDetector()
     key, *decoys = read(KEY, glimpse, 1.0, decoys=10)
     sure = detector.posteriors(key, decoys)
@@ -73,6 +73,44 @@ def test_posteriors_are_sure_of_what_was_sent_and_unsure_of_chance(glimpse):
     assert sure[1, 1] > 0.99
     chance = detector.posteriors(decoys[0], decoys[1:])
     assert chance.max() < 0.99
+
+
+def scored(scores):
+    """A reading of windows that each have a position of their own, with these scores."""
+    scores = np.array(scores, dtype=float)
+    numbers = np.arange(len(scores))
+    return Reading(Timing(0.0, 50.0), scores, scores, numbers, numbers, numbers * 1.0, 0.0, 1)
+
+
+# Null scores of position 0: mean 0.2, variance 0.01; of position 1: mean 0.3, variance 0.04; of both: 0.25 and 0.0275.
+NULL = [scored([[0.1, 0.3], [0.1, 0.5]]), scored([[0.1, 0.3], [0.5, 0.1]])]
+
+
+def test_posteriors_are_those_of_a_gaussian_shift():
+    # The best candidates lie 0.2 and 0.4 above their null mean: a shift of 0.3.
+    posteriors = CoherencyDetector().posteriors(scored([[0.4, 0.2], [0.3, 0.7]]), NULL)
+    first, second = 0.3 * 0.2 / 0.01, 0.3 * 0.4 / 0.04
+    assert posteriors[0] == pytest.approx(np.array([np.exp(first), 1.0]) / (np.exp(first) + 1.0))
+    assert posteriors[1] == pytest.approx(np.array([1.0, np.exp(second)]) / (np.exp(second) + 1.0))
+
+
+def test_ratios_of_windows_are_those_of_the_same_law():
+    ratios = CoherencyDetector().window_ratios(scored([[0.4, 0.2], [0.3, 0.7]]), NULL)
+    # One mean and variance for all windows: the best lie 0.15 and 0.45 above, a shift of 0.3.
+    assert ratios == pytest.approx(0.3 / 0.0275 * np.array([[0.15, -0.05], [0.05, 0.45]]))
+
+
+def test_scores_below_chance_say_nothing():
+    faint = scored([[0.1, 0.05], [0.1, 0.05]])
+    assert CoherencyDetector().posteriors(faint, NULL) == pytest.approx(np.full((2, 2), 0.5))
+    assert CoherencyDetector().window_ratios(faint, NULL) == pytest.approx(np.zeros((2, 2)))
+
+
+def test_decoys_that_all_score_alike_divide_by_nothing():
+    alike = [scored([[0.2, 0.2]]), scored([[0.2, 0.2]])]
+    posteriors = CoherencyDetector().posteriors(scored([[0.4, 0.2]]), alike)
+    assert posteriors == pytest.approx(np.array([[1.0, 0.0]]))
+    assert np.isfinite(CoherencyDetector().window_ratios(scored([[0.4, 0.2]]), alike)).all()
 
 
 def test_the_paper_s_score_of_a_single_window_is_the_reading_s(glimpse):
@@ -94,7 +132,7 @@ def test_a_track_with_too_few_axes_is_refused():
         read(KEY, glimpse_of_track(flat), 0.0)
 
 
-def test_a_channel_s_axes_are_found_by_name_among_those_of_the_track(glimpse):
+def test_a_channel_s_axes_are_found_in_the_track_by_name(glimpse):
     sideways = Glimpse("robot0", glimpse.edges_s, glimpse.velocities[:, ::-1], glimpse.valid, ("y", "x"))
     turned = rate_searched_scores(KEY.codebook(), CHANNEL, sideways, 1.0)
     assert turned == pytest.approx(rate_searched_scores(KEY.codebook(), CHANNEL, glimpse, 1.0))
@@ -106,7 +144,7 @@ def test_axes_without_a_name_in_common_are_taken_in_order(glimpse):
     assert taken == pytest.approx(rate_searched_scores(KEY.codebook(), CHANNEL, glimpse, 1.0))
 
 
-def test_a_detector_that_does_not_exist_is_refused_with_the_ones_that_do():
+def test_a_detector_that_does_not_exist_is_refused():
     with pytest.raises(MtmError, match="coherency"):
         make_detector("guessing")
 

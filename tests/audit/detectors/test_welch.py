@@ -42,7 +42,7 @@ def test_a_long_list_of_candidates_gives_the_same_as_one_by_one(monkeypatch):
     assert parts == pytest.approx(whole, abs=1e-12)
 
 
-def test_a_signal_is_fully_coherent_with_what_a_gain_and_an_offset_make_of_it():
+def test_a_signal_is_coherent_with_its_gain_and_offset():
     x = RNG.standard_normal((1, 1, 300))
     bins = np.arange(3, 30)
     assert mean_coherency(segment_spectra(x, bins), segment_spectra(-2.5 * x + 7.0, bins)) == pytest.approx(1.0)

@@ -49,7 +49,7 @@ def test_recordings_that_start_late_give_the_same_instant():
     assert far.onset_s - 1e6 == pytest.approx(near.onset_s, abs=0.021)
 
 
-def test_a_recording_shorter_than_the_message_is_taken_to_start_with_it():
+def test_a_short_recording_is_taken_to_start_with_the_message():
     track = robot_track(KEY, "robot0", (3, 1), 9.0)
     assert found(track, np.array([50.0])).onset_s == 0.0
 

@@ -68,14 +68,14 @@ def first_reaching(family, accuracy):
     return None
 
 
-def test_equal_channels_share_equally_and_a_stronger_one_carries_more():
+def test_equal_channels_share_equally_and_stronger_carry_more():
     equal, unequal = Split(4, curves(20.0, 20.0), 8), Split(4, curves(15.0, 30.0), 9)
     assert [count for _, count in equal.parts(first_reaching(equal, 0.9))] == [4, 4]
     strong, weak = (count for _, count in unequal.parts(first_reaching(unequal, 0.9)))
     assert strong > weak
 
 
-def test_sharing_by_capacity_carries_the_message_at_little_loss_of_time():
+def test_sharing_by_capacity_costs_little_time():
     for scales in ((20.0, 20.0), (12.0, 30.0), (10.0, 15.0, 40.0)):
         exact, heuristic = Split(4, curves(*scales), 60), SplitByCapacity(4, curves(*scales), 60)
         ticks = first_reaching(heuristic, 0.9)

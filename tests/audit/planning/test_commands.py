@@ -20,7 +20,15 @@ JOB = ("--bits", "10", "--rate", "50", "--alphabet", "4", "--measured-only")
 def folder(tmp_path):
     write_table(tmp_path / "lander.csv", LANDER)
     channels = tuple(Channel(name, "lander", (name,), 1, 0.5) for name in ("x", "y"))
-    scheme = Scheme("lander", 50.0, (0.5, 5.0), 8, 300, channels, power="ensemble")
+    scheme = Scheme(
+        name="lander",
+        rate_hz=50.0,
+        band_hz=(0.5, 5.0),
+        alphabet_size=8,
+        message_ticks=300,
+        channels=channels,
+        power="ensemble",
+    )
     save_key(Key("fake", b"not a real secret, only for test", scheme), tmp_path / "lander.key")
     return tmp_path
 
@@ -40,7 +48,7 @@ def audit(folder, capsys, monkeypatch):
     return run
 
 
-def test_a_plan_names_the_fastest_scheme_first_and_then_one_line_a_strategy(audit):
+def test_a_plan_names_the_fastest_scheme_first(audit):
     code, out, err = audit("plan", "lander.csv", *JOB)
     assert (code, err) == (0, "")
     lines = out.splitlines()
@@ -143,7 +151,7 @@ def test_a_picture_is_drawn(audit, suffix):
         (("--bits", "10", "--like", "lander.csv"), "can be read by others"),
     ],
 )
-def test_what_cannot_be_planned_is_refused_in_one_sentence_and_nothing_is_written(audit, folder, options, says):
+def test_what_cannot_be_planned_is_refused_with_nothing_written(audit, folder, options, says):
     before = sorted(os.listdir(folder))
     code, out, err = audit("plan", "lander.csv", *options)
     assert (code, out) == (1, "")

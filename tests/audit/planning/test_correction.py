@@ -35,14 +35,14 @@ def plan_of(alphabet, accuracy, bits):
     return search(table, Problem(bits, 0.01))[0].plan
 
 
-def test_a_code_on_one_channel_costs_its_length_and_corrects_one_of_seven():
+def test_a_code_on_one_channel_corrects_one_of_seven():
     found = coded(plan_of(8, 0.9, 15), 15, 1)
     assert (found.code.length, found.code.data, found.code.field_bits) == (7, 5, 3)
     assert found.message_ticks == 700
     assert found.accuracy == pytest.approx(0.9**7 + 7 * 0.1 * 0.9**6)
 
 
-def test_short_alphabets_group_symbols_into_the_smallest_field_that_holds_the_codeword():
+def test_short_alphabets_group_symbols_into_the_smallest_field():
     found = coded(plan_of(4, 0.9, 10), 10, 1)
     # GF(4) has codewords of three; in GF(16) ten bits are three symbols of two.
     assert (found.code.length, found.code.data, found.code.field_bits) == (5, 3, 4)
@@ -54,7 +54,7 @@ def test_an_alphabet_that_is_no_power_of_two_has_no_code():
     assert coded(plan_of(6, 0.9, 10), 10, 1) is None
 
 
-def test_codewords_are_dealt_to_the_channels_as_the_plan_deals_symbols():
+def test_codewords_are_dealt_as_the_plan_deals_symbols():
     plan = search(paper_table("lander"), Problem(10, 0.9, (4,), measured_only=True))[2].plan
     found = coded(plan, 10, 1)
     # Two and three of five field symbols, each of two channel symbols: twice as many as uncoded.

@@ -40,12 +40,12 @@ def test_falling_neighbours_are_pooled_by_their_trials():
     assert [curve.accuracy(ticks) for ticks in (50, 75, 100, 150)] == pytest.approx([0.375, 0.375, 0.375, 0.9])
 
 
-def test_between_points_the_logarithm_of_the_error_is_interpolated():
+def test_between_points_the_error_s_logarithm_is_interpolated():
     curve = fit_curve(points_of(60, 90), measured_only=False)
     assert curve.accuracy(75) == pytest.approx(1.0 - (0.4 * 0.1) ** 0.5)
 
 
-def test_where_no_error_was_seen_half_an_error_more_than_none_is_interpolated_to():
+def test_where_no_error_was_seen_half_an_error_counts():
     curve = fit_curve(points_of(60, 100, 100), measured_only=False)
     assert curve.accuracy(75) == pytest.approx(1.0 - (0.4 * 0.5 / 201.0) ** 0.5)
     assert [curve.accuracy(ticks) for ticks in (100, 125, 150)] == [1.0, 1.0, 1.0]

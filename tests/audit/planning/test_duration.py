@@ -9,7 +9,15 @@ from mtm_onboard.protocol import Channel, MtmError, Scheme
 
 def scheme(*counts, ticks=300, combine="split"):
     channels = tuple(Channel(name, name, ("vx",), count, 0.1) for name, count in zip("xyz", counts, strict=False))
-    return Scheme("test", 50.0, (0.5, 5.0), 4, ticks, channels, combine=combine)
+    return Scheme(
+        name="test",
+        rate_hz=50.0,
+        band_hz=(0.5, 5.0),
+        alphabet_size=4,
+        message_ticks=ticks,
+        channels=channels,
+        combine=combine,
+    )
 
 
 def table(*rights, name="x", step=100):
@@ -17,7 +25,7 @@ def table(*rights, name="x", step=100):
     return AccuracyTable(tuple(points))
 
 
-def test_one_message_suffices_where_its_windows_are_accurate_enough():
+def test_one_message_suffices_of_accurate_windows():
     found = required_duration(scheme(1), table(50, 80, 95), 2, 0.9)
     assert (found.repeats, found.from_start_s, found.accuracy) == (1, 6.0, 0.95)
     # Begun in the middle of a message, a recording of one more window still has each window whole.
@@ -72,7 +80,7 @@ def test_what_cannot_be_is_refused_with_what_can(bits, target, says):
         required_duration(scheme(1, ticks=100), table(50, 80, 95), bits, target)
 
 
-def test_longer_windows_than_any_measured_count_as_the_longest_and_that_is_said():
+def test_windows_longer_than_measured_count_as_the_longest():
     found = required_duration(scheme(1, ticks=400), table(50, 80, 95), 2, 0.5)
     assert (found.repeats, found.accuracy, found.beyond) == (1, 0.95, True)
     assert not required_duration(scheme(1, ticks=300), table(50, 80, 95), 2, 0.5).beyond

@@ -19,7 +19,7 @@ def split_of(table, problem):
     return split.plan
 
 
-def test_the_paper_s_lander_allocation_comes_out_of_its_own_tables():
+def test_the_paper_s_lander_allocation_comes_from_its_tables():
     plan = split_of(LANDER, LANDER_JOB)
     assert (plan.allocation, plan.message_ticks) == ({"x": 2, "y": 3}, 576)
     assert plan.window_ticks == {"x": 288, "y": 192}

@@ -50,7 +50,7 @@ def test_comments_blank_lines_and_spaces_are_fine(tmp_path):
         ("", "has no rows; measure at least one channel"),
     ],
 )
-def test_a_table_that_cannot_be_is_refused_with_its_place_and_what_to_do(tmp_path, rows, says):
+def test_an_impossible_table_is_refused_with_its_place(tmp_path, rows, says):
     path = tmp_path / "a.csv"
     path.write_text(HEADER + rows)
     with pytest.raises(MtmError, match=says) as refusal:

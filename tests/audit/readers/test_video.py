@@ -111,7 +111,7 @@ def test_sound_without_pictures_is_refused(tmp_path):
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
-    with pytest.raises(MtmError, match="no file"):
+    with pytest.raises(MtmError, match="check the name"):
         load_tracks(tmp_path / "film.mp4")
     with pytest.raises(MtmError, match="folder"):
         load_tracks(tmp_path)

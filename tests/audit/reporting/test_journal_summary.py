@@ -8,8 +8,8 @@ from hil.fleet.clock import SimulatedClock
 from mtm_audit.cli import main
 from mtm_audit.reporting.journal_summary import injected_noise, summary_of
 from mtm_onboard.journal.journal import Journal
-from mtm_onboard.links.none import NullTransport
-from mtm_onboard.model.velocity import BodyVelocity
+from mtm_onboard.links.none import NullLink
+from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.journal_file import CLAMPED, NOISE, UNSENT, JournalHeader, read_journal
 from mtm_onboard.runtime.guard import Limits
@@ -19,7 +19,17 @@ from tests.onboard.schemes import FAKE_SECRET, small_codebook
 
 BASE = BodyVelocity(0.3, -0.1, 0.5)
 MESSAGE = Modulator(small_codebook(), "a", (2,))
-HEADER = JournalHeader("0123456789abcdef", "fake-key", "robot0", "a", (2, 0, 1, 3), True, 50.0, 0.0, 1.7e9)
+HEADER = JournalHeader(
+    fingerprint="0123456789abcdef",
+    key_id="fake-key",
+    robot="robot0",
+    channel="a",
+    symbols=(2, 0, 1, 3),
+    repeat=True,
+    rate_hz=50.0,
+    start_s=0.0,
+    start_unix_s=1.7e9,
+)
 
 
 @pytest.fixture
@@ -27,7 +37,7 @@ def run(tmp_path):
     """Six seconds of a message, and then a second of stale commands."""
     clock = SimulatedClock()
     with Journal(tmp_path / "run.csv", HEADER, threaded=False) as journal:
-        driven = Driven(NullTransport(), clock, MESSAGE, Limits(1.0, 2.0, noise_sigmas=2.0), journal=journal)
+        driven = Driven(NullLink(), clock, MESSAGE, Limits(1.0, 2.0, noise_sigmas=2.0), journal=journal)
         driven.run(6.0, BASE)
         driven.run(1.0)
         driven.source.stop()
@@ -52,7 +62,7 @@ def test_a_run_in_numbers(run):
     assert summary.rms[2] == summary.energy[2] == 0.0
 
 
-def test_the_noise_of_a_journal_is_the_modulator_s_where_no_limit_cut_it(run):
+def test_a_journal_s_noise_is_the_modulator_s_within_limits(run):
     path, _ = run
     record = read_journal(path)
     truth = injected_noise(record, start_s=3.0)
@@ -70,19 +80,30 @@ def test_in_a_missing_tick_the_noise_is_held_and_not_valid(tmp_path):
     with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
         for tick in (-2, -1, 0, 3, 4):
             sent = BodyVelocity(0.1 * tick, 0.0, 0.0)
-            journal.append(tick, tick / 50.0, BodyVelocity(0.0, 0.0, 0.0), sent, UNSENT if tick == -1 else NOISE)
+            journal.append(tick, tick / 50.0, STOP, sent, UNSENT if tick == -1 else NOISE, 0.0)
     record = read_journal(journal.path)
     truth = injected_noise(record)
     assert truth.edges_s == pytest.approx(1.7e9 + np.arange(-2, 6) / 50.0, abs=1e-6)
     assert truth.velocities[:, 0] == pytest.approx([-0.2, 0.0, 0.0, 0.0, 0.0, 0.3, 0.4])
     assert truth.valid.tolist() == [True, True, True, False, False, True, True]
     assert summary_of(record).missed == 2
+    assert summary_of(record).as_table()["ticks"] | {"sent": 4, "unsent": 1} == summary_of(record).as_table()["ticks"]
 
 
-def test_in_simulated_time_the_noise_counts_from_the_message_s_start(tmp_path):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", None, True, 50.0, 100.0, None)
+def test_simulated_noise_counts_from_the_message_s_start(tmp_path):
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=None,
+        repeat=True,
+        rate_hz=50.0,
+        start_s=100.0,
+        start_unix_s=None,
+    )
     with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
-        journal.append(0, 100.0, BASE, BASE, CLAMPED)
+        journal.append(0, 100.0, BASE, BASE, CLAMPED, 0.0)
     assert injected_noise(read_journal(journal.path)).edges_s == pytest.approx([0.0, 0.02])
 
 
@@ -90,7 +111,7 @@ def test_in_simulated_time_the_noise_counts_from_the_message_s_start(tmp_path):
 def test_what_is_no_run_is_refused(tmp_path, ticks, sentence):
     with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
         for tick in ticks:
-            journal.append(tick, 0.0, BASE, BASE, 0)
+            journal.append(tick, HEADER.start_s + tick / HEADER.rate_hz, BASE, BASE, 0, 0.0)
     record = read_journal(journal.path)
     for ask in (summary_of, injected_noise):
         with pytest.raises(MtmError, match=sentence):
@@ -123,7 +144,7 @@ def test_json_says_the_same_for_programs(run, capsys):
     assert all(math.isfinite(axis["energy"]) for axis in told["noise"].values())
 
 
-def test_a_picture_is_drawn_and_a_wrong_name_is_refused_before_the_reading(run, tmp_path, capsys):
+def test_a_picture_s_wrong_name_is_refused_before_the_reading(run, tmp_path, capsys):
     assert audit(run[0], "--plot", tmp_path / "run.png") == 0
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG\r\n")
     assert audit(tmp_path / "none.csv", "--plot", tmp_path / "run.txt") == 1

@@ -87,7 +87,7 @@ def test_a_robot_out_of_sight_for_long_is_remarked():
     assert warnings == ("robot0 was out of sight for 30% of the time between its first and last sighting",)
 
 
-def test_a_track_too_short_to_read_is_remarked_beside_one_that_was_read():
+def test_a_track_too_short_is_remarked_beside_one_that_is_read():
     warnings, _, decoding = told(track(0), track(1, seconds=3.0))
     assert any("the recording of 'robot1' holds no whole window of 8 s" in warning for warning in warnings)
     assert decoding.channels[1].state == "too short"
@@ -109,7 +109,7 @@ NEAR_THE_LIMIT = [(0.5, 1), (0.011, 1), (0.009, 2), (0.0002, 2)]
 
 
 @pytest.mark.parametrize(("p_value", "sentences"), NEAR_THE_LIMIT)
-def test_a_message_that_is_nearly_found_is_not_passed_off_as_absent(p_value, sentences):
+def test_a_message_nearly_found_is_not_called_absent(p_value, sentences):
     said = said_with(Evidence(None, replace(of_a_silent_robot().evidence.decoys, p_value=p_value)))
     assert len(said) == sentences
     assert sentences == 1 or "more decoy keys (--decoys 100)" in said[1]

@@ -70,7 +70,7 @@ def test_every_decode_of_a_key_meets_the_same_decoys():
     assert len({codebook.samples(channel, 0).tobytes() for codebook in first}) == 3
 
 
-def test_no_decoy_is_the_key_s_own_codebook_or_another_key_s_decoy():
+def test_no_decoy_is_the_key_s_or_another_key_s_decoy():
     channel = KEY.scheme.channels[0]
     others = decoy_codebooks(key_of(KEY.scheme, OTHER_SECRET), 40)
     waveforms = [codebook.samples(channel, 0) for codebook in [KEY.codebook(), *decoy_codebooks(KEY, 40), *others]]
@@ -85,7 +85,7 @@ def test_decoys_play_the_key_s_epoch():
 
 
 @pytest.mark.parametrize("law", ["exponential", "normal", "gumbel", "uniform"])
-def test_log_evidence_p_values_are_uniform_or_cautious_whatever_the_law(law):
+def test_p_values_of_log_evidence_are_uniform_or_cautious(law):
     generator = np.random.default_rng(11)
     draws = getattr(generator, law)(size=(4000, 41))
     p_values = np.array([weigh_log_evidence(row[0], row[1:]).p_value for row in draws])

@@ -55,7 +55,7 @@ def test_joint_angles_are_tracked_to_a_few_milliradians(smooth):
     assert np.all(rms_mrad(track) < [3.0, 6.0])
 
 
-def test_the_outer_link_s_own_direction_is_the_sum_of_both_angles():
+def test_the_outer_link_s_direction_is_the_sum_of_both_angles():
     (track,) = ArmTracker(relative=False).track(arm())
     assert np.all(rms_mrad(track, np.cumsum(OPEN, axis=1)) < [3.0, 6.0])
 
@@ -81,7 +81,7 @@ def test_an_arm_that_hardly_moves_is_measured_too():
     assert np.all(1e3 * np.std(changes, axis=0) < [3.0, 6.0])
 
 
-def test_a_link_that_folds_over_the_other_is_measured_or_missing_but_never_wrong():
+def test_a_folded_link_is_measured_or_missing_and_never_wrong():
     angles = np.stack([0.5 + 0.6 * np.sin(4 * TIMES_S), 2.2 + 0.8 * np.sin(5 * TIMES_S)], axis=1)
     (track,) = tracker("arms").track(arm(angles))
     errors = np.abs(track.positions - angles)[track.valid]

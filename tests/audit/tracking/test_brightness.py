@@ -50,7 +50,7 @@ def test_gray_pictures_show_the_same_as_coloured_ones():
     assert np.array_equal(one.positions, other.positions)
 
 
-def test_ground_that_reaches_the_edge_is_no_body_even_without_a_region():
+def test_ground_that_reaches_the_edge_is_no_body():
     (track,) = tracker("brightness").track(night())
     assert rms(track.positions - truth()) < 0.1
 

@@ -38,7 +38,7 @@ def test_a_thing_in_pieces_is_followed_by_all_of_them():
     assert errors_px(track).max() < 0.15
 
 
-def test_what_is_out_of_reach_does_not_count_once_the_thing_has_been_seen():
+def test_what_is_out_of_reach_of_a_seen_thing_does_not_count():
     frames = list(film(PLACES_PX[:1])) + list(film(PLACES_PX, rival_px=(720, 720)))[1:]
     (track,) = CentroidTracker("#4040bf", 25).track(frames)
     assert errors_px(track).max() < 0.15

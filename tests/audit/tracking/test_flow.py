@@ -45,7 +45,7 @@ def rms(errors):
 
 
 @pytest.mark.parametrize("smooth", [True, False])
-def test_an_unmarked_thing_is_followed_to_a_tenth_of_a_pixel_a_step(smooth):
+def test_an_unmarked_thing_is_followed_to_a_tenth_of_a_pixel(smooth):
     (track,) = FlowTracker(REGION, smooth=smooth).track(room())
     assert (track.name, track.unit) == ("flow", "px")
     assert track.valid.all()
@@ -60,7 +60,7 @@ def test_colour_pictures_will_do():
     assert rms(step_errors(track)) < 0.1
 
 
-def test_what_is_covered_for_a_while_is_missing_and_found_again_where_it_comes_out():
+def test_what_is_covered_is_missing_and_found_where_it_comes_out():
     (track,) = FlowTracker(REGION).track(room(covered=range(20, 32)))
     truth = np.stack([CENTRES[:, 0], 239 - CENTRES[:, 1]], axis=1)
     assert not track.valid[20:32].any()

@@ -55,7 +55,7 @@ def test_a_team_is_tracked_by_its_colours_on_green():
         assert np.abs(track.positions - walk[:, number]).max() < 0.6
 
 
-def test_the_jumps_of_kick_offs_are_taken_out_and_the_agents_own_motion_stays():
+def test_kick_offs_are_taken_out_and_agents_own_motion_stays():
     walk = walks()
     places = kicked_off(walk)
     assert np.abs(steps(places)).max() > 20
@@ -66,7 +66,7 @@ def test_the_jumps_of_kick_offs_are_taken_out_and_the_agents_own_motion_stays():
         assert np.abs(error).max() < 1.5
 
 
-def test_an_agent_that_is_hidden_is_missing_and_its_own_way_meanwhile_counts():
+def test_a_hidden_agent_is_missing_and_its_way_counts():
     walk = walks()
     for number, track in enumerate(FootballTracker().track(match(walk, hidden=range(40, 47)))):
         assert np.array_equal(np.flatnonzero(~track.valid), np.arange(40, 47))
@@ -74,7 +74,7 @@ def test_an_agent_that_is_hidden_is_missing_and_its_own_way_meanwhile_counts():
         assert np.abs(track.positions - walk[:, number])[track.valid].max() < 0.6
 
 
-def test_an_agent_that_another_covers_in_part_is_missing_meanwhile():
+def test_an_agent_that_another_covers_in_part_is_missing():
     walk = walks(2)
     walk[:, 1] = walk[:, 0] + np.stack([np.linspace(-60, 60, FRAMES), np.full(FRAMES, 6.0)], axis=1)
     under, over = FootballTracker(("cyan", "magenta")).track(match(walk))
@@ -83,7 +83,7 @@ def test_an_agent_that_another_covers_in_part_is_missing_meanwhile():
     assert np.abs(under.positions - walk[:, 0])[under.valid].max() < 1.2
 
 
-def test_colours_may_be_chosen_and_number_the_agents_in_their_order():
+def test_chosen_colours_number_the_agents_in_their_order():
     walk = walks(2)
     tracks = tracker("football:yellow, cyan").track(match(walk, team=(TEAM_BGR[2], TEAM_BGR[0])))
     assert [track.name for track in tracks] == ["agent0", "agent1"]

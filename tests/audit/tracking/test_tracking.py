@@ -20,7 +20,15 @@ from mtm_onboard.protocol import MtmError
 
 SECONDS = 1.2
 PHONE = Camera(
-    Optics((2.2, -2.4, 2.4), (0.0, 0.0, 0.2), 700, 960, 540, roll_rad=0.15, radial=(-0.12, 0.02)),
+    optics=Optics(
+        position_m=(2.2, -2.4, 2.4),
+        target_m=(0.0, 0.0, 0.2),
+        focal_px=700,
+        width_px=960,
+        height_px=540,
+        roll_rad=0.15,
+        radial=(-0.12, 0.02),
+    ),
     rate_hz=30.0,
     jitter_s=0.004,
     drop_probability=0.1,
@@ -57,7 +65,7 @@ def rms(errors):
     return float(np.sqrt(np.mean(errors**2)))
 
 
-def test_markers_filmed_from_above_are_tracked_to_a_tenth_of_a_pixel(tmp_path):
+def test_markers_from_above_are_tracked_to_a_tenth_of_a_pixel(tmp_path):
     robots = wandering(4)
     tracks = load_tracks(filmed(Camera(), tmp_path / "film.mp4", robots=robots))
     assert [track.name for track in tracks] == ["marker0", "marker1", "marker2", "marker3"]
@@ -74,7 +82,7 @@ def test_headings_are_counter_clockwise_from_the_pictures_right(tmp_path):
     assert rms(error) < 0.03
 
 
-def test_a_tilted_rolled_and_noisy_phone_with_irregular_frames_still_tracks(tmp_path):
+def test_a_tilted_noisy_phone_of_irregular_frames_tracks(tmp_path):
     tracks = load_tracks(filmed(PHONE, tmp_path / "film.mp4"))
     assert [track.name for track in tracks] == ["marker0", "marker1"]
     nominal = round(SECONDS * PHONE.rate_hz) + 1
@@ -98,11 +106,11 @@ def test_an_occluded_robot_is_missing_and_comes_back(tmp_path):
 @pytest.mark.parametrize("name", ["aruco", "aruco:mirrored"])
 def test_a_mirrored_video_is_read_by_flipping_it_back(tmp_path, name):
     optics = replace(overhead(), mirrored=True)
-    (track, _) = load_tracks(filmed(Camera(optics), tmp_path / "film.mp4"), name)
+    (track, _) = load_tracks(filmed(Camera(optics=optics), tmp_path / "film.mp4"), name)
     assert rms(errors_px(track, wandering()[0], overhead())) < 0.15
 
 
-def test_colours_are_tracked_to_a_tenth_of_a_pixel_and_told_apart(tmp_path):
+def test_colours_are_tracked_and_told_apart(tmp_path):
     scene = Scene(colours_bgr=((220, 220, 30), (200, 40, 200), (30, 210, 220)))
     path = filmed(Camera(blur_px=0.6, noise_levels=2.0), tmp_path / "film.mp4", scene, wandering(3))
     tracks = {track.name: track for track in load_tracks(path, "colour:cyan,magenta,#dcd21e")}
@@ -178,7 +186,7 @@ def test_searching_nearby_finds_what_searching_everywhere_finds(tmp_path, monkey
         assert rms(one.positions - other.positions) < 0.05
 
 
-def test_a_marker_that_leaves_the_picture_is_not_followed_outside():
+def test_a_marker_is_not_followed_outside_the_picture():
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
     marker = cv2.aruco.generateImageMarker(dictionary, 7, 36)
     frames = []
@@ -209,7 +217,7 @@ def test_smoothing_lessens_noise_keeps_gaps_and_follows_motion():
     assert rms((smooth.positions - truth)[settled]) < 0.7 * rms((positions - truth)[settled])
 
 
-def test_the_papers_smoothing_passes_the_motion_that_carries_a_message():
+def test_the_papers_smoothing_passes_a_message_s_motion():
     times_s = np.arange(500) / 50
     positions = np.stack([3 * np.sin(2 * np.pi * 5 * times_s), np.zeros(500)], axis=1)
     smooth = kalman_smoothed(Track("a", times_s, positions, np.ones(500, dtype=bool), unit="px"))

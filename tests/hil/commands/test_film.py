@@ -17,7 +17,7 @@ def filmed(capsys, *arguments):
     return leaving.value.code or 0, captured.out, captured.err
 
 
-def test_a_filmed_lander_s_message_is_decoded_with_the_tracker_that_the_film_names(tmp_path, capsys):
+def test_a_filmed_lander_is_decoded_with_the_named_tracker(tmp_path, capsys):
     key = Key("lander", b"not a real secret, only for test", headline_point("lunar-lander").scheme)
     save_key(key, tmp_path / "lander.key")
     out = tmp_path / "lander"

@@ -7,7 +7,7 @@ from hil.experiments.messages.frames import frame_cells
 from hil.experiments.runs.cells import CellStore
 
 
-def test_the_table_comes_from_the_finished_cells_with_its_command_line(tmp_path, capsys):
+def test_the_table_comes_from_the_cells_with_its_command_line(tmp_path, capsys):
     cells, out = tmp_path / "cells.jsonl", tmp_path / "frames.csv"
     with CellStore(cells) as store:
         for plan in frame_cells(200, 0):

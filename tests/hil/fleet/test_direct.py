@@ -4,12 +4,12 @@ import random
 import pytest
 
 from hil.fleet.clock import SimulatedClock
-from hil.fleet.direct import DirectTransport
+from hil.fleet.direct import DirectLink
 from hil.vehicles.motion_controller import MotionController
 from mtm_onboard.model.velocity import BodyVelocity
 from tests.hil.vehicles.floating_plant import FloatingPlant
 from tests.onboard.links.can_rig import LineRig, VirtualRig, can_rig
-from tests.onboard.links.conformance import Rig, TransportConformance
+from tests.onboard.links.conformance import LinkConformance, Rig
 
 
 def direct_rig(deadman_s=None, poll_s=0.010):
@@ -17,10 +17,10 @@ def direct_rig(deadman_s=None, poll_s=0.010):
     plant = FloatingPlant()
     controller = MotionController(plant, deadman_s)
     clock.every(poll_s, controller.advance)
-    return Rig(DirectTransport(controller, clock), controller, plant, clock, lambda: 0)
+    return Rig(DirectLink(controller, clock), controller, plant, clock, lambda: 0)
 
 
-class TestDirectTransportConforms(TransportConformance):
+class TestDirectLinkConforms(LinkConformance):
     @pytest.fixture
     def rig(self):
         return direct_rig()

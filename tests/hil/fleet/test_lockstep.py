@@ -13,20 +13,20 @@ def motion(result):
     return np.stack([np.column_stack([one.positions_xy_m, one.headings_rad]) for one in result.trajectories])
 
 
-def test_the_can_bus_and_no_wire_at_all_give_the_same_motion_bit_for_bit():
+def test_the_can_bus_and_no_wire_give_the_same_motion():
     over_can, direct = run_lockstep(short_run(wire="can")), run_lockstep(short_run(wire="direct"))
     assert np.array_equal(motion(over_can), motion(direct))
     assert np.ptp(motion(direct)[:, :, 0], axis=1).min() > 0.3
 
 
-def test_in_plaintext_the_motion_is_the_same_up_to_the_rounding_of_commands():
+def test_in_plaintext_the_motion_is_the_same_up_to_rounding():
     direct, plaintext = (motion(run_lockstep(short_run(wire=wire))) for wire in ("direct", "plaintext"))
     difference = np.abs(plaintext - direct)
     assert 0.0 < difference[:, :, :2].max() < 5e-4
     assert difference[:, :, 2].max() < 1e-3
 
 
-def test_over_mavlink_the_motion_is_the_same_but_for_the_tick_in_which_the_vehicle_was_awaited():
+def test_over_mavlink_the_motion_is_the_same_but_for_a_tick():
     direct, vehicle = (run_lockstep(short_run(wire=wire)) for wire in ("direct", "mavlink"))
     assert all(robot.is_clean for robot in vehicle.robots), vehicle.robots
     assert {(robot.sent, robot.missed) for robot in vehicle.robots} == {(149, 0)}
@@ -53,7 +53,7 @@ def test_the_same_seed_repeats_the_run_and_another_does_not():
     assert not np.array_equal(one, other)
 
 
-def test_nothing_differs_before_the_message_begins_and_everything_after():
+def test_nothing_differs_before_the_message_and_all_after():
     silent, sending = motion(run_lockstep(short_run(symbols=None))), motion(run_lockstep(short_run()))
     differs = np.any(silent != sending, axis=(0, 2))
     # Tick 0 is at 0.5 s; the poll after it hands it to the plant, whose delay is 60 ms.
@@ -61,7 +61,7 @@ def test_nothing_differs_before_the_message_begins_and_everything_after():
     assert differs[58:].all()
 
 
-def test_another_secret_moves_the_robots_otherwise_under_the_same_seed():
+def test_another_secret_moves_the_robots_otherwise():
     other = Key("other", b"another secret that is not real!", fake_key().scheme)
     assert not np.array_equal(motion(run_lockstep(short_run())), motion(run_lockstep(short_run(key=other))))
 
@@ -82,7 +82,7 @@ def test_slip_permutation_and_sensors_have_seeds_of_their_own():
     assert len({seeds_of(seed).permutation() for seed in range(40)}) > 10
 
 
-def test_the_fleet_s_scheme_is_that_of_the_key_generator_s_preset(tmp_path, capsys):
+def test_the_fleet_s_scheme_is_the_key_generator_s_preset(tmp_path, capsys):
     onboard(["keygen", "--id", "a", "--preset", "robomaster-fleet", "--out", str(tmp_path / "a.key")])
     assert fake_key(600).scheme.fingerprint in capsys.readouterr().out
 
@@ -95,17 +95,36 @@ def test_the_fleet_s_scheme_is_that_of_the_key_generator_s_preset(tmp_path, caps
         ({"symbols": (0, 1)}, "2 symbols given"),
         ({"symbols": (0, 1, 2, 4)}, "outside the alphabet"),
         ({"seed": -1}, "seed is -1"),
-        ({"key": Key("x", FAKE_SECRET, Scheme("x", 50.0, (0.5, 5.0), 4, 100, (Channel("a", "a", ("vx",), 1, 0.1),)))},
-         "1 channels and this world 4 robots"),
+        (
+            {
+                "key": Key(
+                    "x",
+                    FAKE_SECRET,
+                    Scheme(
+                        name="x",
+                        rate_hz=50.0,
+                        band_hz=(0.5, 5.0),
+                        alphabet_size=4,
+                        message_ticks=100,
+                        channels=(Channel("a", "a", ("vx",), 1, 0.1),),
+                    ),
+                )
+            },
+            "1 channels and this world 4 robots",
+        ),
     ],
-)  # fmt: skip
+)
 def test_settings_that_make_no_sense_are_refused_in_one_sentence(changes, sentence):
     with pytest.raises(MtmError, match=sentence):
         short_run(**changes)
 
 
-def test_a_channel_that_no_body_velocity_has_is_refused_before_anything_moves():
+def test_a_channel_of_no_body_velocity_is_refused_at_rest():
     joints = tuple(Channel(f"j{number}", f"j{number}", ("elbow",), 1, 0.1) for number in range(4))
-    key = Key("arms", FAKE_SECRET, Scheme("arms", 50.0, (0.5, 5.0), 4, 100, joints))
+    key = Key(
+        "arms",
+        FAKE_SECRET,
+        Scheme(name="arms", rate_hz=50.0, band_hz=(0.5, 5.0), alphabet_size=4, message_ticks=100, channels=joints),
+    )
     with pytest.raises(MtmError, match="elbow"):
-        run_lockstep(RunSettings(key, (0, 1, 2, 3), 2.0, 1, start_s=0.5))
+        run_lockstep(RunSettings(key=key, symbols=(0, 1, 2, 3), seconds=2.0, seed=1, start_s=0.5))

@@ -67,7 +67,7 @@ def read_slot(result, key: Key, unix_s: float, slot: int):
     return decode_frame(symbols, key.scheme, key.secret, epoch=epoch_of_slot(slot, key.scheme)[0])
 
 
-def test_a_message_changed_under_way_takes_effect_at_the_boundary_in_the_true_motion():
+def test_a_changed_message_begins_at_the_boundary_in_true_motion():
     settings = run_of(unix_s=MIDNIGHT_S + 600.0, seconds=25.0, modulator=Changing)
     result = run_lockstep(settings)
     first = settings.first_slot
@@ -91,7 +91,7 @@ def test_messages_are_read_across_midnight_by_the_time_of_day():
         assert read_slot(result, settings.key, settings.unix_s, slot).payload == 11
 
 
-def test_another_start_within_the_same_slot_begins_with_the_same_waveforms_at_the_same_time():
+def test_another_start_in_a_slot_begins_with_the_same_waveforms():
     early, late = (run_of(unix_s=MIDNIGHT_S + after_s, seconds=10.0) for after_s in (0.1, 2.0))
     assert early.first_slot == late.first_slot
     assert early.unix_s + early.onset_s == pytest.approx(late.unix_s + late.onset_s, abs=1e-6)
@@ -102,7 +102,7 @@ def test_without_a_time_of_day_slot_0_begins_with_the_message():
     assert run_lockstep(run_of(seconds=1.0)).onset_s == 0.5
 
 
-def test_under_the_fixed_schedule_the_time_of_day_changes_nothing():
+def test_a_fixed_schedule_does_not_ask_the_time_of_day():
     fixed = run_of(key=key_of(schedule="fixed"), seconds=2.0)
     motions = [run_lockstep(replace(fixed, unix_s=unix_s)) for unix_s in (None, MIDNIGHT_S + 3.3)]
     assert {motion.onset_s for motion in motions} == {0.5}

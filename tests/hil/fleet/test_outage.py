@@ -7,7 +7,7 @@ from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.reporting.journal_summary import injected_noise, summary_of
 from mtm_onboard.journal.journal import Journal
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol.journal_file import JournalHeader, read_journal
 from mtm_onboard.runtime.modulator import Modulator
@@ -24,10 +24,20 @@ BASE = BodyVelocity(0.2, 0.05, 0.0)
 def outage(tmp_path_factory):
     """24 s of an 8 s message through an outage of 3 s: the motion that a camera saw, and the journal."""
     path = tmp_path_factory.mktemp("outage") / "robot0.csv"
-    header = JournalHeader(KEY.scheme.fingerprint, KEY.id, "robot0", "robot0", SYMBOLS, True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint=KEY.scheme.fingerprint,
+        key_id=KEY.id,
+        robot="robot0",
+        channel="robot0",
+        symbols=SYMBOLS,
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     poses = []
     with can_rig(LineRig, deadman_s=0.2) as rig, Journal(path, header, threaded=False) as journal:
-        link = ReconnectingTransport(rig.remake, rig.clock)
+        link = ReconnectingLink(rig.remake, rig.clock)
         rig.clock.every(link.service_period_s, link.service)
         rig.clock.every(0.01, lambda _: poses.append(rig.plant.position_xy_m))
         with link:

@@ -10,14 +10,34 @@ from mtm_onboard.journal.journal import JournalHeader, JournalRecord, read_journ
 from mtm_onboard.protocol import MtmError, save_key
 from mtm_onboard.protocol.framing import Framing
 from tests.hil.fleet.short_runs import fake_key, short_run
+from tests.patience import PATIENCE_S
 
 
 def journal(ticks, damaged=0):
     count = len(ticks)
-    header = JournalHeader("0" * 16, "fake", "robot0", "robot0", (0, 1, 2, 3), True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake",
+        robot="robot0",
+        channel="robot0",
+        symbols=(0, 1, 2, 3),
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     ticks = np.array(ticks, dtype=np.int64)
     rows, none = np.zeros((count, 3)), np.zeros(count)
-    return JournalRecord(header, ticks, ticks / 50, rows, rows, none, none.astype(np.int64), damaged)
+    return JournalRecord(
+        header=header,
+        ticks=ticks,
+        times_s=ticks / 50,
+        base=rows,
+        sent=rows,
+        lateness_s=none,
+        flags=none.astype(np.int64),
+        damaged=damaged,
+    )
 
 
 def test_missed_ticks_are_counted():
@@ -56,11 +76,11 @@ def framed_run(framing: Framing, payload, schedule="fixed") -> RunSettings:
         (framed_run(Framing("bytes", 8), b"\x0f"), ["--hex", "0f"]),
     ],
 )
-def test_the_programs_are_told_the_message_as_their_command_line_takes_it(settings, arguments):
+def test_the_programs_are_told_the_message_by_their_options(settings, arguments):
     assert _content(settings) == arguments
 
 
-def test_a_rolling_run_in_real_time_is_later_by_what_remains_until_a_slot_begins():
+def test_a_rolling_run_in_real_time_waits_for_a_slot():
     settings = framed_run(Framing("integer", 8), 77, "rolling")
     aligned, start_unix_s = _aligned(settings, 1_800_000_001.5)
     assert start_unix_s == 1_800_000_006.0
@@ -71,23 +91,36 @@ def test_a_rolling_run_in_real_time_is_later_by_what_remains_until_a_slot_begins
 
 @pytest.mark.realtime
 @pytest.mark.parametrize("wire", ["can", "plaintext", "mavlink"])
-def test_four_onboard_programs_drive_four_robots_through_serial_devices_or_udp(tmp_path, wire):
-    settings = short_run(key=fake_key(100), seconds=6.0, start_s=3.5, wire=wire)
-    save_key(settings.key, tmp_path / "robot.key")
-    result = run_realtime(settings, tmp_path / "robot.key", tmp_path)
+def test_four_programs_drive_four_robots_in_real_time(tmp_path, wire):
+    settings, result, folder = in_time(short_run(key=fake_key(100), wire=wire), tmp_path)
     assert [robot.name for robot in result.robots] == ["robot0", "robot1", "robot2", "robot3"]
     assert all(robot.is_stopped and robot.faults == 0 for robot in result.robots), result.robots
     for trajectory in result.trajectories:
-        assert trajectory.times_s[-1] == pytest.approx(6.0, abs=0.1)
+        assert settings.start_s < trajectory.times_s[-1] <= settings.seconds
         assert np.ptp(trajectory.positions_xy_m[:, 0]) > 0.3
     for robot in result.robots:
-        header = read_journal(tmp_path / f"{robot.name}.csv").header
+        header = read_journal(folder / f"{robot.name}.csv").header
         assert (header.symbols, header.fingerprint) == (settings.symbols, settings.key.scheme.fingerprint)
+
+
+def in_time(settings, folder):
+    """The run with as much time for four interpreters to start as they need on this machine, and its folder."""
+    save_key(settings.key, folder / "robot.key")
+    for start_s in (3.5, 12.0, 40.0):
+        own = folder / f"{start_s}"
+        own.mkdir()
+        given = replace(settings, start_s=start_s, seconds=start_s + 2.5)
+        try:
+            return given, run_realtime(given, folder / "robot.key", own), own
+        except MtmError as refusal:
+            if "less busy machine" not in str(refusal):
+                raise
+    raise AssertionError("four programs did not start in 40 s")
 
 
 @pytest.mark.realtime
 def test_a_program_that_fails_ends_the_run_with_its_own_words(tmp_path):
-    settings = short_run(seconds=6.0, start_s=3.5)
+    settings = short_run(seconds=PATIENCE_S, start_s=3.5)
     (tmp_path / "robot.key").write_text("no key")
     (tmp_path / "robot.key").chmod(0o600)
     with pytest.raises(MtmError, match="mtm-onboard of robot[0-3] ended with code 1.*robot.key is not valid TOML"):
@@ -101,4 +134,4 @@ def test_a_program_that_ends_early_ends_the_run(tmp_path, monkeypatch):
     early.chmod(0o755)
     monkeypatch.setattr("hil.fleet.onboard_process.program", lambda _: str(early))
     with pytest.raises(MtmError, match=r"mtm-onboard of robot0 ended with code 0 \(gone\)"):
-        run_realtime(short_run(seconds=6.0, start_s=3.5), tmp_path / "robot.key", tmp_path)
+        run_realtime(short_run(seconds=PATIENCE_S, start_s=3.5), tmp_path / "robot.key", tmp_path)

@@ -8,7 +8,15 @@ from hil.sensors.poses import Occlusion, Trajectory
 from hil.sensors.scene import Scene
 from mtm_onboard.protocol import MtmError
 
-OBLIQUE = Optics((2.6, -2.8, 2.4), (0.1, 0.1, 0.0), 700, 640, 480, roll_rad=0.2, radial=(-0.1, 0.01))
+OBLIQUE = Optics(
+    position_m=(2.6, -2.8, 2.4),
+    target_m=(0.1, 0.1, 0.0),
+    focal_px=700,
+    width_px=640,
+    height_px=480,
+    roll_rad=0.2,
+    radial=(-0.1, 0.01),
+)
 
 
 def still(x=0.5, y=0.3, heading=0.0, name="robot0"):
@@ -23,8 +31,10 @@ def first_picture(camera, scene, trajectories, seed=1):
     return next(film(camera, scene, trajectories, np.random.default_rng(seed))).image
 
 
-@pytest.mark.parametrize("optics", [overhead(), OBLIQUE, Optics((2, 1, 3), (0, 0, 0), 600, mirrored=True)])
-def test_a_point_of_a_plane_is_seen_by_the_pixel_that_it_projects_to(optics):
+@pytest.mark.parametrize(
+    "optics", [overhead(), OBLIQUE, Optics(position_m=(2, 1, 3), target_m=(0, 0, 0), focal_px=600, mirrored=True)]
+)
+def test_a_point_of_a_plane_is_seen_by_its_own_pixel(optics):
     plane = optics.plane_xy_m(0.2)
     for row, column in ((100, 120), (240, 320), (400, 500)):
         point = np.append(plane[row, column], 0.2)[None]
@@ -40,27 +50,30 @@ def test_from_straight_above_x_points_right_and_y_points_up():
 
 
 def test_a_rolled_camera_turns_its_picture_the_other_way():
-    upright, rolled = Optics((0, -3, 2), (0, 0, 0), 600), Optics((0, -3, 2), (0, 0, 0), 600, roll_rad=np.pi / 2)
+    upright, rolled = (
+        Optics(position_m=(0, -3, 2), target_m=(0, 0, 0), focal_px=600),
+        Optics(position_m=(0, -3, 2), target_m=(0, 0, 0), focal_px=600, roll_rad=np.pi / 2),
+    )
     offsets = [optics.project(np.array([[0.5, 0.0, 0.0]]))[0] - (704 - 1) / 2 for optics in (upright, rolled)]
     assert offsets[0][0] > 50
     assert offsets[1] == pytest.approx([0.0, -offsets[0][0]], abs=1e-6)
 
 
 def test_pixels_above_the_horizon_see_no_floor():
-    plane = Optics((0, -3, 1), (0, 0, 1), 300).plane_xy_m(0.0)
+    plane = Optics(position_m=(0, -3, 1), target_m=(0, 0, 1), focal_px=300).plane_xy_m(0.0)
     assert np.isnan(plane[:300]).all()
     assert np.isfinite(plane[-1]).all()
 
 
 def test_a_camera_needs_something_to_look_at():
     with pytest.raises(MtmError, match="its own position"):
-        Optics((0, 0, 1), (0, 0, 1), 300)
+        Optics(position_m=(0, 0, 1), target_m=(0, 0, 1), focal_px=300)
 
 
 @pytest.mark.parametrize("optics", [overhead(), OBLIQUE])
 def test_a_coloured_top_is_centred_where_the_geometry_puts_it(optics):
     robot = still()
-    picture = first_picture(Camera(optics), Scene(colours_bgr=((0, 0, 255),)), [robot]).astype(float)
+    picture = first_picture(Camera(optics=optics), Scene(colours_bgr=((0, 0, 255),)), [robot]).astype(float)
     red = np.maximum(picture[..., 2] - picture[..., 1] - 20, 0)
     rows, columns = np.indices(red.shape)
     seen = [(red * columns).sum() / red.sum(), (red * rows).sum() / red.sum()]
@@ -70,9 +83,9 @@ def test_a_coloured_top_is_centred_where_the_geometry_puts_it(optics):
 
 
 def test_a_mirrored_camera_shows_the_flipped_picture():
-    plain = first_picture(Camera(overhead()), Scene(), [still()])
-    optics = Optics((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), overhead().focal_px, mirrored=True)
-    mirrored = first_picture(Camera(optics), Scene(), [still()])
+    plain = first_picture(Camera(optics=overhead()), Scene(), [still()])
+    optics = Optics(position_m=(0.0, 0.0, 5.0), target_m=(0.0, 0.0, 0.0), focal_px=overhead().focal_px, mirrored=True)
+    mirrored = first_picture(Camera(optics=optics), Scene(), [still()])
     robot = plain < 60
     assert robot.sum() > 300
     assert np.abs(mirrored[:, ::-1][robot].astype(int) - plain[robot]).mean() < 10
@@ -80,12 +93,12 @@ def test_a_mirrored_camera_shows_the_flipped_picture():
 
 
 def test_the_nearer_robot_hides_the_one_behind_it():
-    optics = Optics((0.0, -3.0, 1.0), (0.0, 0.0, 0.2), 700)
+    optics = Optics(position_m=(0.0, -3.0, 1.0), target_m=(0.0, 0.0, 0.2), focal_px=700)
     near, far = still(0.0, -0.5, name="near"), still(0.0, 0.0, name="far")
     red, blue = (0, 0, 255), (255, 0, 0)
     for order, colours in (([near, far], (red, blue)), ([far, near], (blue, red))):
-        alone = first_picture(Camera(optics), Scene(colours_bgr=(red,)), [near])
-        both = first_picture(Camera(optics), Scene(colours_bgr=colours), order)
+        alone = first_picture(Camera(optics=optics), Scene(colours_bgr=(red,)), [near])
+        both = first_picture(Camera(optics=optics), Scene(colours_bgr=colours), order)
         top = (alone[..., 2] > 200) & (alone[..., 1] < 60)
         assert top.sum() > 50
         assert np.array_equal(both[top], alone[top])
@@ -100,7 +113,7 @@ def test_a_long_exposure_smears_what_moves():
     assert contrast[1] < 0.9 * contrast[0]
 
 
-def test_noise_has_the_stated_strength_and_another_place_in_every_frame():
+def test_noise_has_the_stated_strength_and_differs_by_frame():
     frames = film(Camera(noise_levels=3.0), Scene(), [still()], np.random.default_rng(1))
     first, second = next(frames).image.astype(float), next(frames).image.astype(float)
     assert (first - second).std() == pytest.approx(3.0 * np.sqrt(2), rel=0.1)
@@ -113,7 +126,7 @@ def test_the_same_seed_films_the_same_recording():
     assert all(np.array_equal(a.image, b.image) for a, b in zip(one, same, strict=True))
 
 
-def test_frames_jitter_around_their_period_and_drop_at_the_stated_rate():
+def test_frames_jitter_and_drop_at_the_stated_rate():
     regular = frame_times(Camera(), 10.0, np.random.default_rng(1))
     assert regular == pytest.approx(np.arange(301) / 30)
     irregular = frame_times(Camera(jitter_s=0.005, drop_probability=0.2), 100.0, np.random.default_rng(1))
@@ -133,9 +146,9 @@ def test_an_occluded_robot_shows_no_marker():
 
 def test_a_robot_behind_the_camera_or_out_of_view_is_left_out():
     scene = Scene()
-    for optics in (overhead(), Optics((0.0, -1.0, 1.0), (0.0, 3.0, 0.0), 500)):
-        seen = first_picture(Camera(optics), scene, [still(0.0, -9.0)])
-        assert np.array_equal(seen, first_picture(Camera(optics), scene, [still(0.0, -12.0)]))
+    for optics in (overhead(), Optics(position_m=(0.0, -1.0, 1.0), target_m=(0.0, 3.0, 0.0), focal_px=500)):
+        seen = first_picture(Camera(optics=optics), scene, [still(0.0, -9.0)])
+        assert np.array_equal(seen, first_picture(Camera(optics=optics), scene, [still(0.0, -12.0)]))
 
 
 def test_more_robots_than_markers_are_refused():

@@ -103,7 +103,9 @@ def test_wheel_speeds_drive_the_robot(node, bus, payload, expected):
 
 def test_what_wants_an_answer_gets_one_and_nothing_else_does(node, bus):
     tell(node, bus, ENGAGE, FORWARD)
-    assert bus.answers == [Message(0xC3, 0x09, 0, 0x80, 0x3F, 0x19, b"\x00")]
+    assert bus.answers == [
+        Message(sender=0xC3, receiver=0x09, sequence=0, attributes=0x80, cmdset=0x3F, cmdid=0x19, payload=b"\x00")
+    ]
     assert bus.ids == {0x202}
 
 
@@ -113,7 +115,7 @@ def test_a_published_wheel_command_gets_the_published_answer(node, bus):
     assert [encode(answer).hex() for answer in bus.answers] == ["550e0466c3c96b04803f2000d530"]
 
 
-def test_a_speed_that_is_not_finite_is_a_fault_and_keeps_the_command_before(node, bus):
+def test_a_speed_that_is_not_finite_is_a_fault(node, bus):
     bad = commands.SPEED.message(1, struct.pack("<fff", math.nan, 0.0, 0.0))
     tell(node, bus, ENGAGE, FORWARD, bad)
     assert velocity(node) == BodyVelocity(0.5, 0.0, 0.0)
@@ -131,16 +133,18 @@ def test_a_broken_message_is_a_fault_and_the_one_after_is_obeyed(node, bus):
 
 
 @pytest.mark.parametrize("message", [commands.WORK_MODE.message(1, b"\x07"), telemetry.SUBSCRIBE.message(1, b"\x09")])
-def test_a_payload_that_contradicts_its_command_is_refused_and_counted(node, bus, message):
+def test_a_payload_that_contradicts_its_command_is_refused(node, bus, message):
     tell(node, bus, message)
     assert node.malformed_messages == 1
     assert [answer.payload for answer in bus.answers] == [b"\x01"]
 
 
-def test_what_the_robot_does_not_know_is_counted_and_left_unanswered(node, bus):
-    light = Message(0x09, 0x18, 0, 0x40, 0x3F, 0x32, bytes(13))
-    ping = Message(0x0A, 0xC3, 0, 0x40, 0x00, 0x01)
-    push_answer = Message(0x09, 0x03, 0, 0xA0, 0x48, 0x08, b"\x01")
+def test_what_the_robot_does_not_know_is_counted(node, bus):
+    light = Message(sender=0x09, receiver=0x18, sequence=0, attributes=0x40, cmdset=0x3F, cmdid=0x32, payload=bytes(13))
+    ping = Message(sender=0x0A, receiver=0xC3, sequence=0, attributes=0x40, cmdset=0x00, cmdid=0x01)
+    push_answer = Message(
+        sender=0x09, receiver=0x03, sequence=0, attributes=0xA0, cmdset=0x48, cmdid=0x08, payload=b"\x01"
+    )
     tell(node, bus, light, ping, push_answer)
     assert node.ignored_messages == 3
     assert bus.answers == []
@@ -154,7 +158,19 @@ def test_frames_of_other_nodes_are_not_listened_to(node, bus):
 
 def test_heartbeats_to_either_half_of_the_robot_are_counted(node, bus):
     tell(node, bus, commands.HEARTBEAT.message(0, commands.HEARTBEAT_PAYLOAD))
-    tell(node, bus, Message(0x09, 0x03, 0, 0, 0x3F, 0x60, commands.HEARTBEAT_PAYLOAD))
+    tell(
+        node,
+        bus,
+        Message(
+            sender=0x09,
+            receiver=0x03,
+            sequence=0,
+            attributes=0,
+            cmdset=0x3F,
+            cmdid=0x60,
+            payload=commands.HEARTBEAT_PAYLOAD,
+        ),
+    )
     assert node.heartbeats == 2
 
 
@@ -191,7 +207,7 @@ def test_an_unstamped_subscription_is_pushed_without_time(node, bus):
     assert pushes(bus)[0].payload == bytes.fromhex("0004") + bytes(12)
 
 
-def test_the_pushed_pose_is_relative_to_where_the_robot_was_switched_on(bus):
+def test_the_pushed_pose_is_relative_to_switching_on(bus):
     plant = FloatingPlant()
     plant.command(0.0, BodyVelocity(1.0, 0.0, math.pi / 2))
     plant.step(1.0)  # one metre forward, then facing left
@@ -215,21 +231,62 @@ def test_the_end_of_a_subscription_ends_the_pushes(node, bus):
     assert bus.answers[-1].payload == b"\x00"
 
 
-@pytest.mark.parametrize(
-    "wanted", [subscribe(topics=(0x0002000326E2A309,)), subscribe(rate_hz=0), subscribe(rate_hz=201)]
-)
-def test_a_topic_or_rate_the_robot_cannot_serve_is_refused(node, bus, wanted):
+def test_an_unknown_topic_is_named_and_the_others_are_pushed(node, bus):
+    tell(node, bus, subscribe(topics=(telemetry.POSITION, 0x0002000391A13D9C, telemetry.ATTITUDE)))
+    assert bus.answers[-1].payload == bytes.fromhex("00030004 9c3da191")
+    node.poll(0.02)
+    assert len(bus.answers[-1].payload) == 2 + 8 + 12 + 12
+
+
+def test_seven_topics_are_pushed_where_the_client_looks(node, bus):
+    bus.put(
+        bytes.fromhex(
+            "554c046c090302004048030901030007a702298803000200663e3e4c03000200fbdcf5d70300020009a326e203000200"
+            "f41d1cdc0300020042ee131d03000200b3f7e64703000200320035 76"
+        )
+    )
+    tell(node, bus, ENGAGE, FORWARD)
+    node.poll(0.02)
+    (push,) = [message for message in bus.answers if telemetry.PUSH.matches(message)]
+    message = encode(push)
+    assert len(message) == 155
+    # The client's offsets count from the attributes, the ninth byte.
+    body_mps = struct.unpack_from("<6f", message, 8 + 27)[3:]
+    rpm = struct.unpack_from("<4h", message, 8 + 61)
+    assert body_mps == pytest.approx((0.5, 0.0, 0.0))
+    assert rpm == (95, -95, -95, 95)
+    assert struct.unpack_from("<6f", message, 8 + 97)[2] == -1.0
+    assert struct.unpack_from("<H", message, 8 + 51)[0] > 11_000
+
+
+def test_a_node_that_is_reset_has_no_streams(node, bus):
+    tell(node, bus, subscribe(), telemetry.RESET_NODE.message(3, b"\x09"))
+    node.poll(0.1)
+    assert not [message for message in bus.answers if telemetry.PUSH.matches(message)]
+
+
+def test_a_robot_that_cannot_engage_says_so_and_stands_still(bus):
+    node = CanMotionController(MotionController(FloatingPlant()), bus, can_engage=False)
+    tell(node, bus, ENGAGE, FORWARD)
+    (answer,) = bus.answers
+    assert (answer.sender, answer.receiver, answer.attributes) == (0xC3, 0x09, 0x80)
+    assert (answer.cmdset, answer.cmdid, answer.payload) == (0x3F, 0x19, b"\x01")
+    assert velocity(node) == STOP
+
+
+@pytest.mark.parametrize("wanted", [subscribe(rate_hz=0), subscribe(rate_hz=201)])
+def test_a_rate_the_robot_cannot_serve_is_refused(node, bus, wanted):
     tell(node, bus, wanted, now_s=0.0)
     node.poll(1.0)
     assert [answer.payload[0] for answer in bus.answers] == [1]
 
 
-def test_a_granted_subscription_is_answered_with_publisher_and_stream(node, bus):
+def test_a_granted_subscription_is_answered(node, bus):
     tell(node, bus, telemetry.ADD_NODE.message(1, telemetry.add_node_payload()), subscribe(stream=4))
     assert [answer.payload.hex() for answer in bus.answers] == ["0003", "0003000400000000"]
 
 
-def test_a_bus_that_cannot_be_written_to_is_counted_and_commands_are_still_obeyed(node, bus):
+def test_a_bus_that_takes_no_answers_still_brings_commands(node, bus):
     bus.is_broken = True
     tell(node, bus, ENGAGE, FORWARD)
     assert node.bus_errors == 1

@@ -82,7 +82,7 @@ def test_a_copter_goes_to_the_right_and_a_rover_only_faster(name):
 
 
 @pytest.mark.parametrize("name", ["copter", "px4"])
-def test_a_velocity_in_the_local_frame_is_towards_north_and_east_whatever_the_heading(name):
+def test_a_local_velocity_is_towards_north_and_east(name):
     companion = Companion(name, is_guided=True, is_armed=True)
     for _ in range(50):
         companion.setpoint(yaw_rate=-1.0)
@@ -96,10 +96,10 @@ def test_a_velocity_in_the_local_frame_is_towards_north_and_east_whatever_the_he
 @pytest.mark.parametrize(
     "change",
     [
-        {"mask": 0}, {"mask": 0x0FFF}, {"mask": 0x0DC7}, {"mask": 0x05C0}, {"mask": 0x0407}, {"mask": 0x01C7},
-        {"mask": 0x07C7}, {"mask": 0x05CF}, {"mask": 0x05D7},
+        {"mask": 0}, {"mask": 0x0FFF}, {"mask": 0x05C0}, {"mask": 0x0407}, {"mask": 0x01C7},
+        {"mask": 0x0407 | 0x0200}, {"mask": 0x05CF}, {"mask": 0x05D7},
         {"frame": 0}, {"frame": 3}, {"frame": 12}, {"frame": 255},
-        {"vx": math.nan}, {"yaw_rate": math.inf}, {"vz": math.nan},
+        {"vx": math.nan}, {"yaw_rate": math.inf}, {"vz": math.nan, "mask": 0x05C7},
     ],
     ids=str,
 )  # fmt: skip
@@ -108,6 +108,52 @@ def test_what_a_real_one_ignores_is_ignored_and_counted(ready, change):
     assert ready.setpoint(**({"vx": 0.5} | change)) == STOP
     assert (ready.vehicle.setpoints, ready.vehicle.ignored_setpoints) == (before, 1)
     assert ready.vehicle.controller.faults == 0
+
+
+@pytest.mark.parametrize("name", ["copter", "px4"])
+def test_a_velocity_without_a_yaw_rate_turns_nothing(name):
+    companion = Companion(name, is_guided=True, is_armed=True)
+    assert companion.setpoint(vx=0.5, vy=0.25, yaw_rate=math.nan, mask=0x0DC7) == BodyVelocity(0.5, -0.25, 0.0)
+
+
+@pytest.mark.parametrize("mask", [0x0FC7, 0x0DE7])
+def test_a_rover_that_is_told_a_velocity_alone_steers_towards_it(mask):
+    companion = Companion("rover", is_guided=True, is_armed=True)
+    speed_mps, _, turn_radps = companion.setpoint(vx=0.4, vy=0.3, mask=mask)
+    assert speed_mps == pytest.approx(0.5)
+    assert turn_radps < -0.5  # to the right
+    assert companion.setpoint(vx=0.5, mask=mask) == BodyVelocity(0.5, 0.0, 0.0)
+
+
+def test_ardupilot_s_force_bit_counts_with_accelerations_only():
+    assert Companion("copter", is_guided=True, is_armed=True).setpoint(vx=0.5, mask=0x0FC7).vx_mps == 0.5
+    assert Companion("px4", is_guided=True, is_armed=True).setpoint(vx=0.5, mask=0x0FC7) == STOP
+
+
+def test_arming_and_modes_are_obeyed_with_nan_behind_them():
+    companion = Companion("rover")
+    assert companion.ask(SET_MODE, 1.0, 15.0, *[math.nan] * 5) == [ACCEPTED]
+    assert companion.ask(ARM, 1.0, *[math.nan] * 6) == [ACCEPTED]
+    assert companion.vehicle.is_obeying
+
+
+@pytest.mark.parametrize("name", FIRMWARES)
+def test_parameters_are_told_to_whoever_asks(name):
+    companion = Companion(name)
+    messages = companion.messages
+    companion.port.write(companion.codec.encode(messages.MAVLink_param_request_list_message(1, 1)))
+    companion.run()
+    told = companion.heard("PARAM_VALUE")
+    assert [one.param_index for one in told] == list(range(told[0].param_count))
+    assert len({one.param_id for one in told}) == len(told) >= 2
+    for wanted in (told[1].param_id.encode(), 1), (told[1].param_id.encode(), -1), (b"", 1):
+        companion.port.write(companion.codec.encode(messages.MAVLink_param_request_read_message(1, 1, *wanted)))
+        companion.run()
+        (one,) = companion.heard("PARAM_VALUE")
+        assert (one.param_id, one.param_value) == (told[1].param_id, told[1].param_value)
+    companion.port.write(companion.codec.encode(messages.MAVLink_param_request_read_message(1, 1, b"NO_SUCH", -1)))
+    companion.run()
+    assert companion.heard("PARAM_VALUE") == []
 
 
 def test_offset_frames_are_arducopters_and_not_px4s():
@@ -130,7 +176,7 @@ def test_set_points_move_nothing_outside_the_mode_or_disarmed(name, state):
 
 
 @pytest.mark.parametrize(("name", "seconds"), [("copter", 3.0), ("rover", 3.0), ("px4", 1.0)])
-def test_a_vehicle_stops_when_set_points_cease_and_px4_leaves_offboard(name, seconds):
+def test_a_vehicle_stops_when_set_points_cease(name, seconds):
     companion = Companion(name, is_guided=True, is_armed=True)
     companion.setpoint(vx=0.5)
     companion.run(seconds - 0.05)
@@ -171,7 +217,7 @@ def test_a_stream_that_has_ended_is_not_enough():
 
 
 @pytest.mark.parametrize(("name", "number"), [("copter", 4.0), ("rover", 15.0)])
-def test_ardupilot_changes_modes_when_asked_and_arms_when_its_checks_pass(name, number):
+def test_ardupilot_changes_modes_and_arms_when_its_checks_pass(name, number):
     companion = Companion(name)
     assert companion.ask(SET_MODE, 1.0, number) == [ACCEPTED]
     assert companion.ask(ARM, 1.0) == [ACCEPTED]
@@ -205,7 +251,7 @@ def test_requests_that_make_no_sense_change_nothing(request_, answer):
     assert companion.ask(*request_, system=9) == []
 
 
-def test_it_says_what_it_is_once_a_second_and_how_it_moves_ten_times():
+def test_it_says_what_it_is_each_second_and_moves_ten_times():
     companion = Companion("rover", is_guided=True)
     companion.run(5.0)
     heard = companion.heard()

@@ -16,8 +16,7 @@ from hil.wires.plaintext_ports import TcpPort
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from tests.hil.vehicles.floating_plant import FloatingPlant
 from tests.onboard.links.plaintext_rig import free_udp_port
-
-PATIENCE_S = 10.0
+from tests.patience import PATIENCE_S
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 

@@ -29,14 +29,14 @@ def test_a_sound_wire_carries_everything_as_it_is(wire):
     assert carried(wire) == UNITS
 
 
-def test_a_wire_that_drops_loses_about_that_part_and_nothing_else(wire):
+def test_a_wire_that_drops_loses_about_that_part(wire):
     wire.faults = WireFaults(drop=0.25)
     arrived = carried(wire)
     assert 120 < len(arrived) < 180
     assert arrived == [unit for unit in UNITS if unit in arrived]
 
 
-def test_a_wire_that_duplicates_sends_about_that_part_twice_in_a_row(wire):
+def test_a_wire_that_duplicates_sends_about_that_part_twice(wire):
     wire.faults = WireFaults(duplicate=0.25)
     arrived = carried(wire)
     assert 220 < len(arrived) < 280
@@ -80,7 +80,7 @@ def frame(data: bytes = b"12345678") -> can.Message:
     return can.Message(arbitration_id=0x201, is_extended_id=False, data=data)
 
 
-def test_a_cut_can_bus_is_off_for_us_and_loses_what_was_under_way(wire):
+def test_a_cut_can_bus_is_off_and_loses_what_was_under_way(wire):
     ours, theirs = FaultyBus(wire, is_robot=False), FaultyBus(wire, is_robot=True)
     ours.send(frame())
     wire.cut()
@@ -112,7 +112,7 @@ def test_a_cut_line_fails_for_us_alone(wire):
     assert ours.read() == b"ok;"
 
 
-def test_a_cut_port_fails_for_us_alone_and_what_waited_at_its_end_is_gone(wire):
+def test_a_cut_port_fails_for_us_alone(wire):
     ours, theirs = FaultyPort(wire, is_robot=False), FaultyPort(wire, is_robot=True)
     ours.write(b"set-point")
     assert theirs.read() == b"set-point"

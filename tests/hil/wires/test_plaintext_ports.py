@@ -12,9 +12,7 @@ from mtm_onboard.links.robomaster_uart import RoboMasterUart
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from tests.hil.vehicles.floating_plant import FloatingPlant
 from tests.onboard.links.plaintext_rig import free_udp_port
-
-# The kernel passes bytes along in its own time, so these tests wait for them, briefly.
-PATIENCE_S = 5.0
+from tests.patience import PATIENCE_S
 
 
 def until(condition, act=lambda: None):
@@ -66,7 +64,7 @@ def test_a_line_without_room_loses_whole_texts_and_never_waits():
         assert len(numbers) == number + 1 - 10
 
 
-def test_a_line_whose_client_has_gone_says_so_and_takes_answers_for_nobody():
+def test_a_line_whose_client_has_gone_says_so():
     ours, theirs = socket.socketpair()
     with ours:
         port = LinePort(ours.fileno(), lambda: None)
@@ -91,7 +89,7 @@ def test_a_pseudo_terminal_outlives_its_clients():
         port.shutdown()
 
 
-def test_clients_come_one_after_the_other_and_each_farewell_is_told_once(tcp):
+def test_clients_come_in_turn_and_each_farewell_is_told_once(tcp):
     assert tcp.receive() == b""
     with client_of(tcp) as first, client_of(tcp) as second:
         first.sendall(b"one;")
@@ -140,7 +138,7 @@ class Driven:
         self.transport.service(0.01 * self.polls)
 
 
-def test_a_robot_is_driven_and_reports_over_a_serial_line_and_drives_on_when_its_client_dies():
+def test_a_robot_on_a_serial_line_drives_on_without_its_client():
     port = PtyPort()
     robot = Driven(port, RoboMasterUart(port.path))
     until(lambda: (told := robot.transport.telemetry) is not None and told.position_xy_m[1] > 0.1, robot.poll)
@@ -158,10 +156,27 @@ def test_a_robot_is_driven_and_reports_over_a_serial_line_and_drives_on_when_its
     robot.node.shutdown()
 
 
-def test_a_robot_is_driven_and_reports_over_the_network_and_stops_when_its_client_dies(tcp):
+def test_a_robot_on_the_network_stops_without_its_client(tcp):
     robot = Driven(tcp, RoboMasterTcp("127.0.0.1", tcp.port, tcp._push_port))
     until(lambda: (told := robot.transport.telemetry) is not None and told.position_xy_m[1] > 0.1, robot.poll)
     robot.transport.close()
     until(lambda: not robot.node.is_taken, robot.poll)
     assert robot.plant.velocity_body == STOP
     assert robot.node.faults == robot.transport.refusals == robot.transport.malformed == 0
+
+
+def test_clients_of_the_event_port_are_let_in_and_told_nothing():
+    port = TcpPort(push_port=free_udp_port(), event_port=0)
+    try:
+        clients = [socket.create_connection(("127.0.0.1", port.event_port), PATIENCE_S) for _ in range(10)]
+        for _ in range(20):
+            port.receive()
+        clients[-1].setblocking(False)
+        with pytest.raises(BlockingIOError):
+            clients[-1].recv(1)
+        # The oldest give way, so that whoever keeps connecting takes no more and more descriptors.
+        assert clients[0].recv(1) == b""
+        for client in clients:
+            client.close()
+    finally:
+        port.shutdown()

@@ -20,6 +20,8 @@ from mtm_audit.model.track import Floats
 from mtm_audit.readers.video import read_frames
 from mtm_onboard.protocol import Codebook, MtmError
 
+pytestmark = pytest.mark.long
+
 SECRET = b"not a real secret, only for test"
 TICKS = 72
 WORLD = Discovery()
@@ -93,7 +95,7 @@ def test_the_agent_stays_where_the_camera_need_not_zoom_out() -> None:
     assert max(np.abs(_states(rollout)).max() for rollout in rollouts) < 0.9
 
 
-def test_the_task_leaves_the_distance_of_the_paper_with_noise_and_without() -> None:
+def test_the_task_leaves_the_distance_of_the_paper() -> None:
     silent = np.zeros((10, WORLD.task_ticks, 2))
     for noise in (silent, _noise(10, 1, WORLD.task_ticks)[:, 0]):
         left_m = [control.scores[FINAL_DISTANCE] for control in WORLD.perform(noise, range(10))]
@@ -106,7 +108,7 @@ def test_goals_that_do_not_exist_or_fit_the_noise_are_refused(goals: np.ndarray)
         WORLD.run(goals, np.zeros((1, 1, 10, 2)), [0])
 
 
-def test_pictures_show_the_agent_where_it_is_at_the_time_it_is_there() -> None:
+def test_pictures_show_the_agent_where_it_is_at_the_time() -> None:
     (shot,) = WORLD.run(np.array([[4]]), _noise(1, 1, 48), [1])[0].shots
     frames = list(WORLD.pictures(shot))
     assert {frame.size for frame in frames} == {WORLD.picture_px}
@@ -117,7 +119,7 @@ def test_pictures_show_the_agent_where_it_is_at_the_time_it_is_there() -> None:
     assert np.abs(track.positions - _pixels(shot.states)).max() < 1.0
 
 
-def test_the_tracker_finds_the_agent_again_after_it_was_out_of_sight() -> None:
+def test_the_tracker_finds_the_agent_after_it_was_out_of_sight() -> None:
     (shot,) = WORLD.run(np.array([[4]]), _noise(1, 1, 48), [1])[0].shots
     frames = list(WORLD.pictures(shot))
     for number in range(10, 30):

@@ -13,6 +13,8 @@ from mtm_onboard.protocol import MtmError
 torch = pytest.importorskip("torch")
 pytest.importorskip("vmas")
 
+pytestmark = pytest.mark.long
+
 TICKS = 20
 SEEDS = (3, 4, 5)
 # A metre in pixels.
@@ -39,7 +41,7 @@ def kicked_off(places_m):
     return np.concatenate([np.ravel(places_m), [1.2, 0.6, 1.2, 0.0, 1.2, -0.6], [0.0, 0.5]])
 
 
-def test_a_rollout_is_one_shot_with_a_frame_before_its_first_tick_and_one_after_each():
+def test_a_rollout_is_one_shot_with_a_frame_before_each_tick():
     (shot,) = played(0.3)[0].shots
     assert shot.first_tick == 0
     assert np.allclose(shot.times_s, np.arange(TICKS + 1) / 10)
@@ -52,7 +54,7 @@ def test_the_same_call_gives_the_same_rollouts():
         assert np.array_equal(first.shots[0].states, second.shots[0].states)
 
 
-def test_noise_is_added_to_every_action_and_what_is_sent_is_clamped():
+def test_noise_is_added_to_every_action_and_then_clamped():
     for rollout, own in zip(played(0.3), noise(0.3), strict=True):
         control = rollout.control
         assert np.allclose(control.requested - control.base, own[0])
@@ -72,7 +74,7 @@ def test_noise_moves_the_agents_from_the_second_frame_on():
     assert np.array_equal(clean[1, 6:12], noisy[1, 6:12])
 
 
-def test_nobody_leaves_the_pitch_or_is_faster_than_the_simulator_allows():
+def test_nobody_leaves_the_pitch_or_is_too_fast():
     states = np.stack([rollout.shots[0].states for rollout in played(0.3)])
     places_m = states.reshape(len(SEEDS), TICKS + 1, 7, 2)
     assert np.abs(places_m[..., 0]).max() < 1.6
@@ -102,14 +104,14 @@ def test_after_a_goal_play_goes_on_from_a_kick_off(monkeypatch):
     assert np.array_equal(after[6], (0.0, 0.0))
 
 
-def test_the_measures_of_the_task_are_the_balls_distance_and_whether_the_team_scored():
+def test_the_task_is_measured_by_the_ball_and_the_score():
     for control in Football().perform(noise(0.0)[:, 0], SEEDS):
         assert set(control.scores) == {MEAN_DISTANCE, SCORED}
         assert 0.0 < control.scores[MEAN_DISTANCE] < 3.1
         assert control.scores[SCORED] in (0.0, 1.0)
 
 
-def test_arrays_that_do_not_belong_together_and_strategies_that_do_not_exist_are_refused():
+def test_arrays_that_do_not_belong_together_are_refused():
     world = Football()
     with pytest.raises(MtmError, match="do not belong together"):
         world.run(np.zeros((2, 1), dtype=int), noise(0.0), SEEDS)
@@ -140,7 +142,7 @@ def test_every_strategy_moves_its_team_in_its_own_way():
     assert np.abs(flat).max() <= 1.0
 
 
-def test_who_stands_right_behind_the_ball_pushes_it_towards_the_goal():
+def test_who_stands_behind_the_ball_pushes_it_to_the_goal():
     actions = Team(STRATEGIES).actions(strategies(np.arange(STRATEGIES)), sight([(-0.05, 0.0), (-0.9, 0.5), (-1, 0)]))
     assert np.all(actions[:, 0, 0] > 0.5)
 

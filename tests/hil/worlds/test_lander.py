@@ -48,7 +48,7 @@ def drawn(shot_number):
     return tuple(WORLD.pictures(rollout(6, 1).shots[shot_number]))
 
 
-def test_a_shot_begins_after_the_descents_before_it_and_has_a_frame_more_than_ticks():
+def test_a_shot_has_a_frame_more_than_ticks():
     first, second = rollout(6, 1).shots
     assert (first.first_tick, second.first_tick) == (0, 192)
     assert first.times_s[0] == pytest.approx(3.0)
@@ -57,7 +57,7 @@ def test_a_shot_begins_after_the_descents_before_it_and_has_a_frame_more_than_ti
     assert len(first.times_s) == len(first.states) == 193
 
 
-def test_the_lander_hovers_over_its_pad_in_view_and_above_all_terrain():
+def test_the_lander_hovers_over_its_pad_in_view():
     for shot, pad in zip(rollout(6, 1).shots, (6, 1), strict=True):
         hull = bodies(shot)[:, 0]
         assert hull[-1, 0] == pytest.approx(lander.PADS_X_M[pad], abs=1.5)
@@ -65,7 +65,7 @@ def test_the_lander_hovers_over_its_pad_in_view_and_above_all_terrain():
         assert shot.states[0, : states.TERRAIN_POINTS].max() < hull[:, 1].min() - 1.0
 
 
-def test_a_rollout_comes_again_from_its_seed_and_another_descends_over_other_terrain():
+def test_a_rollout_comes_again_from_its_seed_alone():
     again, other = rollout.__wrapped__(6, 1), rollout(6, 1, seed=4)
     assert np.array_equal(again.shots[1].states, rollout(6, 1).shots[1].states, equal_nan=True)
     assert not np.array_equal(other.shots[0].states[0, :11], rollout(6, 1).shots[0].states[0, :11])
@@ -80,7 +80,7 @@ def test_the_engines_get_the_noise_within_their_limits():
     assert control.scores["ended goals"] == 0.0
 
 
-def test_the_motion_is_that_of_the_environment_as_it_comes_with_its_flames():
+def test_the_motion_is_that_of_the_environment_with_its_flames():
     environment = lunar_lander.LunarLander(render_mode="rgb_array", continuous=True)
     environment.reset(seed=lander._environment_seed([3, 0]))
     for _ in range(lander.WARM_UP_TICKS):
@@ -92,7 +92,7 @@ def test_the_motion_is_that_of_the_environment_as_it_comes_with_its_flames():
     assert np.array_equal(bodies(rollout(6, 1).shots[0])[-1], expected)
 
 
-def test_a_goal_that_gymnasium_ends_is_counted_and_filmed_to_its_end():
+def test_a_goal_that_gymnasium_ends_is_filmed_to_its_end():
     noise = np.full((1, 1, 150, 2), (0.0, -5.0))
     fallen = WORLD.run(np.array([[0]]), noise, [1])[0]
     assert fallen.control.scores["ended goals"] == 1.0
@@ -105,7 +105,7 @@ def test_the_pad_is_read_from_the_pictures():
         assert scores(tracked(drawn(number)), start_s).argmax() == pad
 
 
-def test_the_software_pictures_decode_as_those_of_gymnasium_itself():
+def test_software_pictures_decode_as_those_of_gymnasium():
     shot = rollout(6, 1).shots[1]
     ours, theirs = tracked(drawn(1)), tracked(WORLD.native_pictures(shot))
     assert ours.positions == pytest.approx(theirs.positions, abs=0.5)
@@ -114,7 +114,7 @@ def test_the_software_pictures_decode_as_those_of_gymnasium_itself():
     assert scores(ours, start_s) == pytest.approx(scores(theirs, start_s), abs=0.06)
 
 
-def test_a_software_picture_differs_from_gymnasiums_at_edges_only():
+def test_software_pictures_differ_at_edges_only():
     shot = rollout(6, 1).shots[1]
     short = replace(shot, times_s=shot.times_s[60:63], states=shot.states[60:63])
     for ours, theirs in zip(WORLD.pictures(short), WORLD.native_pictures(short), strict=True):

@@ -44,7 +44,7 @@ def inner_scores(codebook: Codebook, track: Track) -> Floats:
     return rate_searched_scores(codebook, codebook.scheme.channels[0], glimpse_of_track(inner), 0.0)
 
 
-def test_the_mean_action_brings_the_fingertip_to_the_target_from_any_pose(world: Reacher) -> None:
+def test_the_mean_action_brings_the_fingertip_to_the_target(world: Reacher) -> None:
     goals = np.arange(8).reshape(8, 1)
     rollouts = world.run(goals, np.full((8, 1, 50, 2), ALMOST_NOTHING), range(8))
     misses_m = [rollout.control.scores["final distance (m)"] for rollout in rollouts]
@@ -136,7 +136,7 @@ def test_a_video_file_decodes_as_the_pictures_in_memory(world: Reacher, tmp_path
     assert file == pytest.approx(memory, abs=0.02)
 
 
-def test_over_all_keys_the_noise_and_the_action_have_the_policys_own_marginal(world: Reacher) -> None:
+def test_over_all_keys_actions_have_the_policys_marginal(world: Reacher) -> None:
     scheme = single_scheme("reacher", "inner", 8, 240, 1)
     channel = scheme.channels[0]
     secrets = (number.to_bytes(4) + SECRET[4:] for number in range(10_000))

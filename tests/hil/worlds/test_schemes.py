@@ -4,7 +4,7 @@ from hil.worlds.schemes import same_scheme, single_scheme, split_scheme
 from mtm_onboard.protocol import MtmError
 
 
-def test_the_axes_of_one_body_are_one_channel_when_they_carry_the_same():
+def test_axes_of_one_body_that_carry_the_same_are_one_channel():
     (channel,) = same_scheme("reacher", 8, 240, 1).channels
     assert (channel.body, channel.axes) == ("arm", ("inner", "outer"))
 
@@ -20,7 +20,7 @@ def test_a_split_message_has_so_many_symbols_on_each_channel():
     assert [scheme.window_ticks(channel) for channel in scheme.channels] == [288, 192]
 
 
-def test_a_stochastic_policy_keeps_its_marginals_and_controllers_their_power():
+def test_a_stochastic_policy_keeps_its_marginals():
     assert same_scheme("reacher", 8, 240, 1).power == "ensemble"
     assert same_scheme("lunar-lander", 8, 288, 1).power == "window"
 

@@ -32,19 +32,19 @@ def band_mps(velocities, low_hz, high_hz):
 
 
 @pytest.mark.parametrize("name", TASKS)
-def test_every_errand_is_driven_without_a_fault_and_within_the_limits(name):
+def test_every_errand_is_driven_within_the_limits(name):
     assert all(robot.is_clean and robot.clamped == 0 for robot in driven(name).robots)
 
 
 @pytest.mark.parametrize("name", TASKS)
-def test_an_errand_moves_the_robot_and_keeps_it_within_two_metres_and_a_half(name):
+def test_an_errand_moves_the_robot_within_two_and_a_half_metres(name):
     for trajectory in driven(name).trajectories:
         away_m = np.linalg.norm(trajectory.positions_xy_m - trajectory.positions_xy_m[0], axis=1)
         assert 0.05 < away_m.max() < 2.5
 
 
 @pytest.mark.parametrize("name", [name for name in TASKS if name != "zigzag"])
-def test_an_errand_is_another_one_for_another_seed_and_the_same_for_the_same(name):
+def test_an_errand_is_another_one_for_another_seed(name):
     ours, others = TASKS[name](ROUTE, 1), TASKS[name](ROUTE, 2)
     again = TASKS[name](ROUTE, 1)
     commands = [[task.command((-0.5, -1.5), 0.0) for _ in range(200)] for task in (ours, others, again)]
@@ -71,14 +71,14 @@ def test_an_orbit_keeps_its_distance_from_one_point():
     assert np.ptp(radii_m) < 0.1 * radii_m.mean()
 
 
-def test_a_reciprocating_robot_moves_along_one_line_at_a_pace_in_the_band():
+def test_a_reciprocating_robot_moves_along_one_line_in_the_band():
     velocities = velocities_mps("reciprocate")
     spread = np.linalg.eigvalsh(np.cov(velocities.T))
     assert spread[0] < 0.2 * spread[1]
     assert np.linalg.norm(band_mps(velocities, 0.5, 2.0)) > 0.1
 
 
-def test_an_exploring_robot_is_as_loud_in_the_band_as_one_with_a_message():
+def test_an_exploring_robot_is_as_loud_in_the_band_as_a_message():
     quiet, loud = (band_mps(velocities_mps(name), 2.0, 5.0) for name in ("stop and go", "explore"))
     assert np.all(loud > 1.3 * quiet)
     alone = np.array([

@@ -17,7 +17,15 @@ SECRET = b"not a real secret, only for test"
 def key_path(tmp_path, request):
     schedule, robots = getattr(request, "param", ("rolling", 2))
     channels = tuple(Channel(f"robot{n}", f"robot{n}", ("vx", "vy"), 2, 0.1) for n in range(robots))
-    scheme = Scheme("test", 50.0, (0.5, 5.0), 4, 100, channels, schedule=schedule)
+    scheme = Scheme(
+        name="test",
+        rate_hz=50.0,
+        band_hz=(0.5, 5.0),
+        alphabet_size=4,
+        message_ticks=100,
+        channels=channels,
+        schedule=schedule,
+    )
     save_key(Key("test", SECRET, scheme), tmp_path / "robot.key")
     return tmp_path / "robot.key"
 
@@ -40,7 +48,7 @@ def test_the_image_holds_the_channels_part_of_the_message(key_path, capsys):
 
 
 @pytest.mark.parametrize("key_path", [("fixed", 1)], indirect=True)
-def test_one_channel_needs_no_name_and_a_fixed_message_repeats_unless_told_not_to(key_path):
+def test_one_channel_needs_no_name_and_a_fixed_message_repeats(key_path):
     assert parse_image(export(key_path, "--message", "5")[1].read_bytes()).repeats
     assert not parse_image(export(key_path, "--message", "5", "--no-repeat")[1].read_bytes()).repeats
 
@@ -48,7 +56,20 @@ def test_one_channel_needs_no_name_and_a_fixed_message_repeats_unless_told_not_t
 def test_a_framed_message_is_written_as_each_slot_and_day_has_it(tmp_path):
     framing = Framing("text", 16, check="tag", check_bits=16, interleave=True)
     channels = (Channel("robot0", "robot0", ("vx", "vy"), 20, 0.1),)
-    key = Key("test", SECRET, Scheme("test", 50.0, (2.0, 20.0), 4, 400, channels, schedule="rolling", framing=framing))
+    key = Key(
+        "test",
+        SECRET,
+        Scheme(
+            name="test",
+            rate_hz=50.0,
+            band_hz=(2.0, 20.0),
+            alphabet_size=4,
+            message_ticks=400,
+            channels=channels,
+            schedule="rolling",
+            framing=framing,
+        ),
+    )
     save_key(key, tmp_path / "robot.key")
     # The second of these three slots of 8 s begins at midnight.
     _, out = export(tmp_path / "robot.key", "--text", "hi", "--first-message", "10799", "--messages", "3")
@@ -75,7 +96,7 @@ def test_a_framed_message_is_written_as_each_slot_and_day_has_it(tmp_path):
         (["--message", "1", "--channel", "robot0", "--limit-mps", "0"], "limit"),
     ],
 )
-def test_bad_input_is_one_sentence_and_leaves_an_older_image_alone(key_path, options, words, capsys):
+def test_bad_input_leaves_an_older_image_alone(key_path, options, words, capsys):
     (key_path.parent / "image.bin").write_bytes(b"older")
     code, out = export(key_path, *options)
     error = capsys.readouterr().err

@@ -1,5 +1,7 @@
 """The commands that make keys with a framing and that ask a running robot."""
 
+import json
+
 import pytest
 
 from mtm_onboard.cli import main
@@ -24,6 +26,11 @@ turn_rate_radps = 2.0
 [source]
 kind = "stdin"
 """
+STATUS = {
+    "robot": "r0", "state": "driving", "late_p99_ms": 0.5, "message": 2, "content": "number 7",
+    "commands": {"age_s": None}, "tick": 9, "missed": 0, "unsent": 1,
+    "link": {"up": True, "fault": None, "heartbeats": 3},
+}  # fmt: skip
 
 
 def keygen(folder, *options) -> int:
@@ -40,7 +47,9 @@ def config(tmp_path):
 def test_keygen_provisions_a_framing_and_the_schedule_s_options(tmp_path):
     assert keygen(tmp_path, *FRAMED) == 0
     scheme = load_key(tmp_path / "robot.key").scheme
-    assert scheme.framing == Framing("text", 64, 4, "tag", 32, "reed-solomon", interleave=True)
+    assert scheme.framing == Framing(
+        "text", 64, number_bits=4, check="tag", check_bits=32, code="reed-solomon", interleave=True
+    )
     assert (scheme.schedule, scheme.epoch, scheme.pooling) == ("rolling", 3, "majority")
 
 
@@ -65,7 +74,7 @@ def test_an_integer_s_size_is_in_bits(tmp_path):
         (("--pooling", "guess"), 1, "pooling"),
     ],
 )
-def test_a_framing_that_cannot_be_is_refused_and_no_key_is_written(tmp_path, capsys, options, code, says):
+def test_a_framing_that_cannot_be_writes_no_key(tmp_path, capsys, options, code, says):
     try:
         ended = keygen(tmp_path, "--preset", "robomaster-fleet", *options)
     except SystemExit as leaving:
@@ -115,11 +124,18 @@ def robot(tmp_path):
                 raise MtmError("the message 999 does not fit; give a smaller one")
             slot = 7 if "text" in request["content"] else None
             replaces = 1 if "hex" in request["content"] else None
-            return {"tick": 120, "unix_s": 1_800_000_000.25, "slot": slot, "number": 2, "replaces": replaces}
+            return {
+                "tick": 120,
+                "unix_s": 1_800_000_000.25,
+                "slot": slot,
+                "number": 2,
+                "content": "number 7",
+                "replaces": replaces,
+            }
         if request["command"] == "silence":
             return {"tick": 120, "unix_s": 1_800_000_000.25, "slot": 7, "replaces": "silence"}
         if request["command"] == "status":
-            return {"robot": "r0", "late_p99_ms": 0.5, "message": None, "link": {"heartbeats": 3}}
+            return dict(STATUS)
         return {"stopped": True}
 
     with ControlSocket(tmp_path / "r.sock") as control:
@@ -130,10 +146,14 @@ def robot(tmp_path):
 @pytest.mark.parametrize(
     ("content", "request_", "says"),
     [
-        (("--message", "7"), {"number": 7}, "message 2 begins at 2027-01-15 08:00:00.250000 UTC (1800000000.250000)\n"),
+        (
+            ("--message", "7"),
+            {"number": 7},
+            "message 2, number 7, begins at 2027-01-15 08:00:00.250000 UTC (1800000000.250000)\n",
+        ),
         (("--text", "-hi"), {"text": "-hi"}, "UTC (1800000000.250000), slot 7\n"),
         (("--hex", "00ff"), {"hex": "00ff"}, "in the place of message 1 that was waiting\n"),
-        (("--symbols", "1,2"), {"symbols": [1, 2]}, "message 2 begins"),
+        (("--symbols", "1,2"), {"symbols": [1, 2]}, "message 2, "),
     ],
 )
 def test_send_asks_for_the_message_and_says_when_it_begins(config, robot, capsys, content, request_, says):
@@ -167,16 +187,58 @@ def test_status_and_stop_ask_the_socket_that_is_named(tmp_path, robot, capsys):
     assert main(["status", "--socket", path]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert [line.split() for line in shown] == [
-        ["robot", "r0"], ["late", "p99", "ms", "0.5"], ["message", "none"], ["link", "heartbeats", "3"],
+        ["robot", "r0"], ["state", "driving"], ["late", "p99", "ms", "0.5"], ["message", "2"],
+        ["content", "number", "7"], ["commands", "age", "s", "none"], ["tick", "9"], ["missed", "0"], ["unsent", "1"],
+        ["link", "up", "True"], ["link", "fault", "none"], ["link", "heartbeats", "3"],
     ]  # fmt: skip
     assert main(["stop", "--socket", path]) == 0
     assert "stands still" in capsys.readouterr().out
     assert robot == [{"command": "status"}, {"command": "stop"}]
 
 
-def test_a_robot_that_does_not_run_or_has_no_socket_gets_one_sentence(tmp_path, config, capsys):
+def test_a_robot_that_does_not_run_gets_one_sentence(tmp_path, config, capsys):
     assert main(["stop", "--config", str(config)]) == 1
     assert "no running robot answers" in capsys.readouterr().err
     config.write_text(CONFIG)
     assert main(["stop", "--config", str(config)]) == 1
     assert "no control socket" in capsys.readouterr().err
+
+
+def test_status_is_json_when_asked_for(config, robot, capsys):
+    assert main(["status", "--config", str(config), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == STATUS
+
+
+def test_a_watched_status_is_a_line_each_time_until_an_interrupt(config, robot, capsys, monkeypatch):
+    pauses = []
+
+    def sleep(seconds: float) -> None:
+        pauses.append(seconds)
+        if len(pauses) == 3:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("time.sleep", sleep)
+    assert main(["status", "--config", str(config), "--watch"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert pauses == [1.0] * 3
+    assert [line.split(maxsplit=1)[1] for line in lines] == [
+        "driving; tick 9; message 2, number 7; no base command yet; link up; 0 missed, 1 unsent"
+    ] * 3
+    pauses.clear()
+    assert main(["status", "--config", str(config), "--watch", "5", "--json"]) == 0
+    assert [json.loads(line) for line in capsys.readouterr().out.splitlines()] == [STATUS] * 3
+
+
+def test_a_robot_that_ends_while_it_is_watched_is_one_sentence(config, capsys, monkeypatch):
+    with ControlSocket(config.parent / "r.sock") as control:
+        control.serve(lambda request: dict(STATUS))
+        monkeypatch.setattr("time.sleep", lambda seconds: control.close())
+        assert main(["status", "--config", str(config), "--watch"]) == 1
+    assert "no running robot answers" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("period", ["0", "nan", "often"])
+def test_a_period_that_is_none_is_wrong_usage(config, period):
+    with pytest.raises(SystemExit) as left:
+        main(["status", "--config", str(config), "--watch", period])
+    assert left.value.code == 2

@@ -5,7 +5,7 @@ import pytest
 
 from mtm_onboard.control.control import Control, Session
 from mtm_onboard.journal.journal import Journal, JournalHeader, read_journal
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.protocol.framing import Framing
@@ -39,11 +39,21 @@ class Robot:
         codebook = key.codebook(FIRST_SLOT)
         self.modulator = Ticking(codebook, "a", SILENCE if content is None else message_of(content, key))
         self.guard = Guard(Limits(1.0, 2.0), Staleness(), noise_sigma=0.1, period_s=0.02)
-        self.stats = LoopStats()
+        self.stats, self.source = LoopStats(), HeldSource()
         session = Session(
-            "robot0", key, self.modulator, self.guard, HeldSource(), NullTransport(), self.stats, journal,
-            lambda: self.tick, START_UNIX_S, FIRST_SLOT,
-        )  # fmt: skip
+            robot="robot0",
+            key=key,
+            modulator=self.modulator,
+            guard=self.guard,
+            source=self.source,
+            transport=NullLink(),
+            stats=self.stats,
+            journal=journal,
+            now_s=lambda: (self.tick + 0.5) / 50.0,
+            start_s=0.0,
+            start_unix_s=START_UNIX_S,
+            first_slot=FIRST_SLOT,
+        )
         self.control = Control(session)
 
     def send(self, **content):
@@ -54,12 +64,13 @@ def key_of(**changes) -> Key:
     return Key("fake-key", FAKE_SECRET, small_scheme(**({"schedule": "rolling"} | changes)))
 
 
-def test_a_new_message_is_answered_with_the_boundary_it_begins_at():
+def test_a_new_message_is_answered_with_its_boundary():
     robot = Robot(key_of(), 7)
     robot.modulator.now = 130
     answer = robot.send(number=9)
     assert answer == {
-        "tick": 240, "unix_s": START_UNIX_S + 4.8, "slot": FIRST_SLOT + 2, "number": 1, "replaces": None,
+        "tick": 240, "unix_s": START_UNIX_S + 4.8, "slot": FIRST_SLOT + 2, "number": 1, "content": "number 9",
+        "replaces": None,
     }  # fmt: skip
     assert robot.modulator.waiting == message_of(9, key_of(), 1)
 
@@ -68,7 +79,7 @@ def test_under_the_fixed_schedule_there_is_no_slot_to_name():
     assert Robot(key_of(schedule="fixed"), 7).send(number=9)["slot"] is None
 
 
-def test_messages_are_numbered_and_one_that_waited_in_vain_is_named():
+def test_messages_are_numbered_and_a_replaced_one_is_named():
     robot = Robot(key_of(framing=Framing("integer", 4, number_bits=2)), 7)
     answers = [robot.send(number=number) for number in (1, 2)]
     robot.modulator.now = 240
@@ -79,7 +90,7 @@ def test_messages_are_numbered_and_one_that_waited_in_vain_is_named():
     assert (robot.modulator.message.number, robot.modulator.message.payload) == (2, 2)
 
 
-def test_a_message_that_does_not_fit_is_refused_and_takes_no_number():
+def test_a_message_that_does_not_fit_takes_no_number():
     robot = Robot(key_of(), 7)
     for content, sentence in (
         ({"number": 999}, "does not fit"),
@@ -92,7 +103,7 @@ def test_a_message_that_does_not_fit_is_refused_and_takes_no_number():
     assert robot.send(number=1)["number"] == 1
 
 
-def test_a_loop_that_stands_still_takes_up_nothing_and_the_client_hears_so(monkeypatch):
+def test_a_loop_that_stands_still_takes_up_nothing(monkeypatch):
     monkeypatch.setattr("mtm_onboard.control.control._PATIENCE_S", 0.01)
     robot = Robot(key_of(), 7)
     robot.modulator.prepare = lambda tick: None
@@ -104,7 +115,7 @@ def test_a_loop_that_stands_still_takes_up_nothing_and_the_client_hears_so(monke
 
 
 @pytest.mark.parametrize(("schedule", "slot"), [("rolling", FIRST_SLOT + 2), ("fixed", None)])
-def test_a_robot_that_began_in_silence_gets_its_first_message_at_the_next_boundary(schedule, slot):
+def test_a_silent_robot_speaks_from_the_next_boundary(schedule, slot):
     robot = Robot(key_of(schedule=schedule))
     robot.modulator.now = 130
     assert status(robot) == ("silence", None, True)
@@ -116,7 +127,17 @@ def test_a_robot_that_began_in_silence_gets_its_first_message_at_the_next_bounda
 
 
 def test_silence_ends_the_message_at_the_next_boundary(tmp_path):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (0,) * 4, True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=(0,) * 4,
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
         robot = Robot(key_of(), 7, journal)
         robot.send(number=3)
@@ -141,7 +162,17 @@ def status(robot: Robot, tick: int = 55):
 
 
 def test_the_stop_is_latched_and_noted_in_the_journal(tmp_path):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (0,) * 4, True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=(0,) * 4,
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
         robot = Robot(key_of(), 7, journal)
         assert [robot.send(number=number)["tick"] for number in (3, 4)] == [120, 120]
@@ -166,7 +197,31 @@ def test_the_status_says_how_the_run_fares_in_json():
         "robot": "robot0", "key": "fake-key", "tick": 55, "sent": 50, "missed": 2, "refused": 1, "message": 0,
         "waiting": 1,
     }  # fmt: skip
-    assert (status["stopped"], status["journal_lost"], status["link"]) == (False, None, {})
+    assert (status["stopped"], status["journal_lost"]) == (False, None)
+    assert status["link"] == {"up": True, "fault": None}
+    assert (status["content"], status["waiting_content"]) == ("number 7", "number 1")
+    assert status["state"] == "standing still without base commands"
+    assert status["commands"] == {"arriving": False, "age_s": None, "sender": None, "of_others": 0, "lost": 0}
+
+
+def test_the_status_says_whether_and_from_whom_commands_arrive():
+    robot = Robot(key_of(), 7)
+    robot.source.sender, robot.source.intrusions = "process 7", 3
+    robot.guard.admit(BodyVelocity(0.1, 0.0, 0.0), 1.1, 1.1)
+    status = robot.control.answer({"command": "status"})
+    assert status["commands"] == {
+        "arriving": True, "age_s": pytest.approx(0.01), "sender": "process 7", "of_others": 3, "lost": 0,
+    }  # fmt: skip
+    assert status["state"] == "driving with the message"
+
+
+def test_a_stopped_robot_takes_no_message_and_says_so():
+    robot = Robot(key_of(), 7)
+    robot.control.answer({"command": "stop"})
+    with pytest.raises(MtmError, match="stopped for good"):
+        robot.send(number=1)
+    assert robot.modulator.waiting is None
+    assert robot.control.answer({"command": "status"})["state"] == "stopped for good"
 
 
 @pytest.mark.parametrize(

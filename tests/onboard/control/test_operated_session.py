@@ -3,7 +3,6 @@
 import threading
 import time
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from hypothesis import strategies as st
 from mtm_onboard.control.control_socket import ControlSocket, ask
 from mtm_onboard.control.session import Outcome, Plan, run_session, start_of
 from mtm_onboard.journal.journal import read_journal
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.protocol.framing import Framing
@@ -23,8 +22,9 @@ from mtm_onboard.runtime.config import config_from_table
 from mtm_onboard.runtime.guard import NOISE, STOPPED
 from mtm_onboard.runtime.message import message_of
 from mtm_onboard.runtime.modulator import Modulator
-from mtm_onboard.runtime.source import Command
+from mtm_onboard.runtime.source import Command, Source
 from tests.onboard.schemes import FAKE_SECRET, small_scheme
+from tests.patience import PATIENCE_S
 
 BASE = BodyVelocity(0.3, -0.1, 0.5)
 # A message of 0.6 s: six bits and the message's number.
@@ -34,16 +34,11 @@ ROLLING, FIXED = small_scheme(schedule="rolling"), small_scheme()
 times_s = st.floats(1.8e9, 1.9e9)
 
 
-class Steady:
+class Steady(Source):
     """A source with a fresh command at every poll."""
-
-    refused = 0
 
     def poll(self, now_s: float) -> Command:
         return Command(BASE, now_s, False)
-
-    def close(self) -> None:
-        pass
 
 
 @pytest.fixture
@@ -87,7 +82,7 @@ class Running:
 
 def asked(config, **request):
     """The answer, as soon as the session listens."""
-    patience_s = time.monotonic() + 10.0
+    patience_s = time.monotonic() + PATIENCE_S
     while True:
         try:
             return ask(Path(config.control.socket), request)
@@ -96,12 +91,13 @@ def asked(config, **request):
                 raise
 
 
-def test_a_message_sent_to_a_running_robot_begins_exactly_at_the_boundary_that_the_answer_names(config):
+def test_a_message_begins_exactly_at_the_boundary_answered(config):
     with Running(config, KEY, Plan(13)) as running:
         while asked(config, command="status")["tick"] < 3:
             pass
         answer = asked(config, command="send", content={"number": 50})
-        threading.Event().wait(max(0.0, answer["unix_s"] - datetime.now(UTC).timestamp()) + 0.3)
+        while asked(config, command="status")["tick"] < answer["tick"] + 3:
+            pass
         outcome = running.end()
     record = read_journal(outcome.journal.path)
     assert slot_start_unix_s(answer["slot"], SCHEME) == pytest.approx(answer["unix_s"], abs=1e-6)
@@ -123,7 +119,7 @@ def test_a_message_sent_to_a_running_robot_begins_exactly_at_the_boundary_that_t
 
 
 @pytest.mark.parametrize("schedule", ["fixed", "rolling"])
-def test_a_robot_started_without_a_message_says_nothing_until_it_is_sent_one_and_again_after_silence(config, schedule):
+def test_a_robot_without_a_message_is_silent_before_and_after(config, schedule):
     key = replace(KEY, scheme=replace(SCHEME, schedule=schedule))
     with Running(config, key, Plan(None)) as running:
         while (before := asked(config, command="status"))["tick"] < 3:
@@ -150,7 +146,7 @@ def test_a_robot_started_without_a_message_says_nothing_until_it_is_sent_one_and
     assert (record.sent - record.base)[calm, :2] == pytest.approx(0.1 * noise[calm], abs=1e-6)
 
 
-def test_the_operator_s_stop_over_the_socket_holds_to_the_end_of_the_run(config):
+def test_the_operator_s_stop_by_the_socket_holds_to_the_end(config):
     with Running(config, replace(KEY, scheme=FIXED), Plan(3)) as running:
         assert asked(config, command="stop") == {"stopped": True}
         sent = asked(config, command="status")["sent"]
@@ -162,23 +158,23 @@ def test_the_operator_s_stop_over_the_socket_holds_to_the_end_of_the_run(config)
     assert not record.sent[-4:].any()
 
 
-def test_a_session_whose_control_socket_is_taken_does_not_open_the_link(config, monkeypatch):
-    link = NullTransport()
-    monkeypatch.setattr("mtm_onboard.control.session.make_transport", lambda kind, options: link)
+def test_a_session_without_its_control_socket_opens_no_link(config, monkeypatch):
+    link = NullLink()
+    monkeypatch.setattr("mtm_onboard.control.session.make_link", lambda kind, options: link)
     with ControlSocket(Path(config.control.socket)), pytest.raises(MtmError, match="another run"):
         run_session(config, KEY, Plan(1), lambda: True)
     assert link.sent == 0
 
 
 @given(times_s, st.none() | st.floats(-1e5, 1e5))
-def test_a_rolling_message_starts_with_the_first_slot_that_is_still_ahead(now_s, later_s):
+def test_a_rolling_message_starts_with_the_next_slot(now_s, later_s):
     start_s, slot = start_of(Plan(1, start_unix_s=None if later_s is None else now_s + later_s), ROLLING, now_s)
     earliest_s = now_s + max(0.1, later_s or 0.0)
     assert start_s == slot_start_unix_s(slot, ROLLING)
     assert earliest_s - 2e-6 <= start_s < earliest_s + 2.4
 
 
-def test_robots_that_start_at_different_moments_play_the_same_slot_at_the_same_time():
+def test_robots_of_different_starts_play_one_slot_at_one_time():
     starts = [start_of(Plan(1), ROLLING, 1.8e9 + delay_s) for delay_s in (0.0, 1.0, 60.0)]
     assert {round(start_s - 2.4 * slot, 6) for start_s, slot in starts} == {0.0}
 
@@ -195,7 +191,7 @@ def test_a_fixed_message_starts_when_it_was_told_to(now_s):
     assert start_of(Plan(1, start_unix_s=now_s - 7.7), FIXED, now_s) == (now_s - 7.7, 0)
 
 
-def test_a_clock_that_was_never_set_is_refused_under_the_rolling_schedule_alone(config, monkeypatch):
+def test_a_clock_never_set_is_refused_under_a_rolling_schedule(config, monkeypatch):
     monkeypatch.setattr("mtm_onboard.control.session.time.time", lambda: 86_400.0)
     with pytest.raises(MtmError, match="set the clock"):
         run_session(config, KEY, Plan(1), lambda: True)
@@ -203,7 +199,7 @@ def test_a_clock_that_was_never_set_is_refused_under_the_rolling_schedule_alone(
 
 
 @pytest.mark.parametrize("content", [64, "hi", b"hi", (0, 1, 2, 3)])
-def test_content_that_the_key_does_not_carry_is_refused_before_anything_opens(config, content):
+def test_content_that_does_not_fit_is_refused_before_opening(config, content):
     with pytest.raises(MtmError):
         run_session(config, KEY, Plan(content), lambda: True)
     assert not Path(config.control.socket).exists()

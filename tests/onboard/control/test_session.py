@@ -7,16 +7,20 @@ from itertools import count
 import pytest
 
 from mtm_onboard.control.session import Plan, run_session
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.base import LinkBusyError
+from mtm_onboard.links.none import NullLink
+from mtm_onboard.model.clock import SystemClock
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Channel, Key, MtmError
-from mtm_onboard.runtime.config import LinkSettings, RealtimeSettings, RobotConfig, config_from_table
+from mtm_onboard.runtime.config import JournalSettings, LinkSettings, RealtimeSettings, RobotConfig, config_from_table
+from mtm_onboard.runtime.source import Source
 from tests.onboard.schemes import FAKE_SECRET, small_scheme
+from tests.patience import PATIENCE_S
 
 KEY = Key("fake-key", FAKE_SECRET, small_scheme())
 
 
-class Link(NullTransport):
+class Link(NullLink):
     """Fails where it is told to, and keeps what happened in order."""
 
     def __init__(self, failing: str = "", failing_from: int = 2) -> None:
@@ -65,22 +69,17 @@ def use(monkeypatch):
     monkeypatch.setattr("mtm_onboard.control.session.StdinSource", Silence)
 
     def patch(link: Link) -> Link:
-        monkeypatch.setattr("mtm_onboard.control.session.make_transport", lambda kind, options: link)
+        monkeypatch.setattr("mtm_onboard.control.session.make_link", lambda kind, options: link)
         return link
 
     return patch
 
 
-class Silence:
+class Silence(Source):
     """A source that no command ever comes from."""
-
-    refused = 0
 
     def poll(self, now_s: float) -> tuple[BodyVelocity, float, bool]:
         return STOP, -math.inf, False
-
-    def close(self) -> None:
-        pass
 
 
 def never() -> bool:
@@ -96,20 +95,51 @@ def test_a_run_opens_the_link_and_leaves_it_stopped_and_closed(config, use):
     assert "journal" not in outcome.summary()
 
 
-def test_a_run_that_is_asked_to_end_at_once_sends_nothing_but_the_stop(config, use):
+def test_a_run_that_is_to_end_at_once_sends_only_the_stop(config, use):
     link = use(Link())
     assert run_session(config, KEY, Plan(None), lambda: True).stats.sent == 0
     assert link.events == ["open", "stop", "stop", "close"]
 
 
 @pytest.mark.parametrize(("failing", "sentence"), [("send", "cable pulled"), ("service", "no heartbeat")])
-def test_a_link_that_fails_on_the_way_stops_the_robot_and_is_an_error(config, use, failing, sentence):
+def test_a_link_that_fails_on_the_way_stops_the_robot(config, use, failing, sentence):
     link = use(Link(failing))
     with pytest.raises(MtmError, match=sentence):
         run_session(config, KEY, Plan((0, 1, 2, 3)), never)
     assert link.events[0] == "open"
     assert link.events[-2:] == ["stop", "close"]
     assert "service" not in {thread.name for thread in threading.enumerate()}
+
+
+def test_a_robot_that_is_not_there_is_an_error_and_no_run(config, tmp_path):
+    journal = {"path": str(tmp_path / "a.csv")}
+    can = replace(
+        config, transport_kind="robomaster-can", transport_options={"interface": "virtual", "channel": "void"}
+    )
+    with pytest.raises(MtmError, match="Nothing has come from the robot"):
+        run_session(replace(can, journal=JournalSettings(**journal)), KEY, Plan((0, 1, 2, 3)), never)
+    assert not (tmp_path / "a.csv").exists()
+
+
+def test_the_summary_tells_what_the_link_counted(config, use):
+    class Counting(Link):
+        degraded = "no telemetry"
+
+        def counters(self) -> dict[str, int]:
+            return {"missed_heartbeats": 3, "refusals": 0}
+
+        def send(self, velocity: BodyVelocity) -> None:
+            super().send(velocity)
+            if self.sent > 3:
+                raise LinkBusyError("full")
+
+    link = use(Counting())
+    outcome = run_session(replace(config, link=LinkSettings()), KEY, Plan((0, 1, 2, 3)), lambda: link.sent >= 6)
+    told = outcome.summary()
+    assert (outcome.stats.sent, outcome.stats.unsent) == (3, 3)
+    assert told.startswith("3 ticks sent, 3 unsent, ")
+    assert "1 times degraded" in told
+    assert told.endswith("; the link counted: dropped 3, missed heartbeats 3")
 
 
 def test_a_link_that_does_not_open_is_an_error(config, use):
@@ -119,7 +149,7 @@ def test_a_link_that_does_not_open_is_an_error(config, use):
     assert link.sent == 0
 
 
-def test_what_does_not_fit_the_key_is_refused_before_the_link_is_opened(config, use):
+def test_what_does_not_fit_the_key_is_refused_before_the_link(config, use):
     link = use(Link())
     arm = replace(KEY, scheme=small_scheme(channels=(Channel("a", "arm", ("shoulder",), 1, 0.1),)))
     for key, message in ((KEY, (0, 1)), (arm, (1,))):
@@ -130,7 +160,7 @@ def test_what_does_not_fit_the_key_is_refused_before_the_link_is_opened(config, 
     assert link.events == []
 
 
-def test_a_link_that_may_come_back_is_opened_anew_and_its_losses_are_told(config, use):
+def test_a_link_that_comes_back_is_opened_and_its_losses_told(config, use):
     link = use(Link("send"))
     config = replace(config, link=LinkSettings())
     plan = Plan((0, 1, 2, 3), duration_s=30.0)
@@ -142,17 +172,23 @@ def test_a_link_that_may_come_back_is_opened_anew_and_its_losses_are_told(config
 
 
 def test_steps_of_the_system_s_time_do_not_touch_a_run(config, use, monkeypatch):
-    use(Link())
-    hours = count()
+    link, hours = use(Link()), count()
     # Set right, an hour back, two hours back ...
     monkeypatch.setattr("mtm_onboard.control.session.time.time", lambda: 1.7e9 - 3600.0 * next(hours))
-    # A second at 50 Hz and the lead before it: an hour's step would send none, or count thousands as missed.
-    stats = run_session(config, KEY, Plan((0, 1, 2, 3), duration_s=1.0), never).stats
-    assert 1 <= stats.sent <= 60
-    assert stats.missed <= 60
+
+    class Impatient(SystemClock):
+        def sleep_until(self, deadline_s: float) -> None:
+            assert deadline_s < self.now() + PATIENCE_S, "the run waits for what a step of the time has moved away"
+            super().sleep_until(deadline_s)
+
+    monkeypatch.setattr("mtm_onboard.control.session.SystemClock", Impatient)
+    stats = run_session(config, KEY, Plan((0, 1, 2, 3)), lambda: link.sent >= 5).stats
+    assert stats.sent == 5
+    # An hour's step would count 180,000 as missed.
+    assert stats.missed < 50 * PATIENCE_S
 
 
-def test_the_robot_is_told_to_stop_before_a_wedged_thread_is_waited_for(config, use, monkeypatch):
+def test_the_robot_stops_before_a_wedged_thread_is_waited_for(config, use, monkeypatch):
     monkeypatch.setattr("mtm_onboard.runtime.service._LONGEST_FAREWELL_S", 20.0)
 
     class Wedged(Link):
@@ -173,7 +209,7 @@ def test_the_robot_is_told_to_stop_before_a_wedged_thread_is_waited_for(config, 
     assert link.events == ["open", "stop", "stop", "close"]
 
 
-def test_the_service_manager_hears_of_the_loop_from_the_loop_itself(config, use, tmp_path, monkeypatch):
+def test_the_service_manager_hears_of_the_loop_by_the_loop(config, use, tmp_path, monkeypatch):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(str(tmp_path / "notify"))
         manager.setblocking(False)
@@ -234,7 +270,7 @@ def heard(manager: socket.socket) -> list[bytes]:
             return words
 
 
-def test_what_the_system_refuses_of_real_time_is_told_and_the_run_goes_on(config, use, capsys):
+def test_refused_real_time_is_told_and_the_run_goes_on(config, use, capsys):
     link = use(Link())
     config = replace(config, realtime=RealtimeSettings(cpu=1023))
     run_session(config, KEY, Plan(None), lambda: link.sent > 0)

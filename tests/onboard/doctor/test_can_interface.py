@@ -48,7 +48,7 @@ def test_an_interface_that_is_not_there_is_a_failure(tmp_path, name):
         ),
     ],
 )
-def test_what_keeps_frames_from_the_robot_is_said_with_what_to_run(tmp_path, entries, details, status, words):
+def test_what_keeps_frames_from_the_robot_is_said_with_a_remedy(tmp_path, entries, details, status, words):
     finding = found(tmp_path, details=details, **entries)
     assert finding.status == status
     assert words in finding.text

@@ -8,6 +8,7 @@ import pytest
 from mtm_onboard.control.control_socket import ControlSocket
 from mtm_onboard.doctor.places import check_control, check_journal, check_key_file, check_source
 from mtm_onboard.runtime.config import ControlSettings, JournalSettings, SourceSettings
+from mtm_onboard.runtime.datagram_source import UnixSource
 
 
 @pytest.fixture
@@ -70,7 +71,7 @@ def test_a_control_socket_of_another_run_is_a_failure_and_stays(tmp_path):
         assert path.exists()
 
 
-def test_a_control_socket_in_no_folder_is_a_failure_unless_the_service_makes_it(tmp_path):
+def test_a_control_socket_in_no_folder_is_a_failure(tmp_path):
     assert check_control(ControlSettings(str(tmp_path / "nowhere" / "r.sock"))).status == "fail"
     assert not Path("/run/mtm-of-no-test").exists()
     assert check_control(ControlSettings("/run/mtm-of-no-test/r.sock")).status == "warn"
@@ -80,6 +81,17 @@ def test_a_port_for_base_commands_is_free_or_a_failure():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         port = other.getsockname()[1]
-        assert check_source(SourceSettings("udp", port)).status == "fail"
-    assert check_source(SourceSettings("udp", port)).status == "pass"
+        assert check_source(SourceSettings("udp", port=port)).status == "fail"
+    assert check_source(SourceSettings("udp", port=port)).status == "pass"
     assert check_source(SourceSettings("stdin")).status == "pass"
+
+
+def test_a_socket_for_base_commands_can_be_made_or_is_a_failure(tmp_path):
+    settings = SourceSettings("unix", str(tmp_path / "r.base"))
+    assert check_source(settings).status == "pass"
+    assert not (tmp_path / "r.base").exists()
+    source = UnixSource(tmp_path / "r.base")
+    assert check_source(settings).status == "fail"
+    source.close()
+    assert check_source(SourceSettings("unix", str(tmp_path / "nowhere" / "r.base"))).status == "fail"
+    assert check_source(SourceSettings("unix", "/run/mtm-of-no-test/r.base")).status == "warn"

@@ -17,7 +17,18 @@ LIMITS = (3.5, 3.5, 10.0)
 def codebook(schedule="fixed", *, axes=("vx", "vy"), sigma=0.1, rate_hz=50.0, ticks=60):
     channel = Channel("robot", "robot", axes, 2, sigma)
     band_hz = (rate_hz / 50, rate_hz / 10)
-    return Codebook(SECRET, Scheme("test", rate_hz, band_hz, 4, ticks, (channel,), schedule=schedule))
+    return Codebook(
+        SECRET,
+        Scheme(
+            name="test",
+            rate_hz=rate_hz,
+            band_hz=band_hz,
+            alphabet_size=4,
+            message_ticks=ticks,
+            channels=(channel,),
+            schedule=schedule,
+        ),
+    )
 
 
 def an_image(schedule="fixed", **options):
@@ -72,7 +83,7 @@ def noise_of(image, row, axis):
     return image.samples[row].astype(float) * unit, unit
 
 
-def test_samples_use_the_whole_range_and_follow_the_order_of_axes():
+def test_samples_use_the_whole_range_in_the_order_of_axes():
     book = codebook()
     noise = 0.1 * np.concatenate([book.samples(book.scheme.channels[0], 0, [s])[0] for s in (1, 2)], axis=1)
     straight = an_image()

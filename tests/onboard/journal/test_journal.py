@@ -22,7 +22,17 @@ from mtm_onboard.protocol.journal_file import (
     segments,
 )
 
-HEADER = JournalHeader("0123456789abcdef", "fake-key", "robot0", "a", (0, 3, 1), True, 50.0, 10.0, 1.7e9)
+HEADER = JournalHeader(
+    fingerprint="0123456789abcdef",
+    key_id="fake-key",
+    robot="robot0",
+    channel="a",
+    symbols=(0, 3, 1),
+    repeat=True,
+    rate_hz=50.0,
+    start_s=10.0,
+    start_unix_s=1.7e9,
+)
 BASE, SENT = BodyVelocity(0.1, -0.2, 0.3), BodyVelocity(0.15, -0.25, 1 / 3)
 
 
@@ -51,7 +61,7 @@ class FillingDisk:
 
 def write(journal: Journal, ticks) -> None:
     for tick in ticks:
-        journal.append(tick, 10.0 + tick / 50.0 + 0.003, BASE, SENT, NOISE | CLAMPED)
+        journal.append(tick, 10.0 + tick / 50.0 + 0.003, BASE, SENT, NOISE | CLAMPED, 0.003)
 
 
 @pytest.mark.parametrize("threaded", [False, True])
@@ -69,8 +79,18 @@ def test_what_was_written_is_read_back(tmp_path, threaded):
     assert (record.damaged, journal.lost) == (0, 0)
 
 
-def test_a_journal_without_ticks_and_without_a_message_is_read_back(tmp_path):
-    header = JournalHeader("0123456789abcdef", "fake-key", "robot0", "a", None, True, 50.0, 0.0, None)
+def test_a_journal_without_ticks_or_message_is_read_back(tmp_path):
+    header = JournalHeader(
+        fingerprint="0123456789abcdef",
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=None,
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
         pass
     record = read_journal(journal.path)
@@ -88,7 +108,7 @@ def test_an_existing_journal_is_kept(tmp_path):
     assert [len(read_journal(path).ticks) for path in paths] == [0, 1, 2]
 
 
-def test_a_disk_that_is_full_for_a_while_costs_rows_that_are_counted(tmp_path):
+def test_a_disk_full_for_a_while_costs_counted_rows(tmp_path):
     path = tmp_path / "a.csv"
     journal = Journal(path, HEADER, threaded=False)
     vars(journal)["_file"].close()
@@ -114,7 +134,17 @@ def test_a_crash_in_the_middle_of_a_row_costs_that_row(tmp_path):
     assert record.damaged == 1
 
 
-def test_a_writer_that_stands_still_holds_up_no_tick_and_fills_no_memory(tmp_path, monkeypatch):
+@pytest.mark.parametrize("line", ["# {", "# [1]", '# {"tick": "a", "text": "b"}', "# ", "#", "# 7"])
+def test_a_damaged_comment_is_counted_and_skipped(tmp_path, line):
+    with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
+        write(journal, range(10))
+    journal.path.write_text(journal.path.read_text() + line + "\n")
+    record = read_journal(journal.path)
+    assert (record.header, record.ticks.tolist()) == (HEADER, list(range(10)))
+    assert (record.damaged, record.events) == (1, ())
+
+
+def test_a_writer_that_stands_still_holds_up_no_tick(tmp_path, monkeypatch):
     monkeypatch.setattr("mtm_onboard.journal.journal._MOST_WAITING", 100)
     monkeypatch.setattr("mtm_onboard.journal.journal._WRITE_PERIOD_S", 1e6)
     with Journal(tmp_path / "a.csv", HEADER, threaded=True) as journal:
@@ -139,7 +169,7 @@ def total_bytes(path: Path) -> int:
     return sum(segment.stat().st_size for segment in segments(path))
 
 
-def test_a_journal_stays_within_its_bound_and_keeps_what_is_newest(tmp_path):
+def test_a_journal_within_its_bound_keeps_what_is_newest(tmp_path):
     with Journal(tmp_path / "a.csv", HEADER, threaded=False, max_bytes=1_000_000) as journal:
         journal.note(0, "message changed to 0,1")
         for first in range(0, 40_000, 500):
@@ -154,14 +184,14 @@ def test_a_journal_stays_within_its_bound_and_keeps_what_is_newest(tmp_path):
     assert record.events == (Event(0, "message changed to 0,1"),)
 
 
-def test_a_journal_whose_last_run_left_only_old_segments_is_not_mixed_with_a_new_one(tmp_path):
+def test_old_segments_alone_are_not_mixed_with_a_new_run(tmp_path):
     (tmp_path / "a.csv.000001").write_bytes(heading(HEADER))
     with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
         write(journal, range(3))
     assert journal.path.name == "a-2.csv"
 
 
-def test_a_journal_that_is_removed_while_it_is_written_goes_on_in_a_new_segment(tmp_path):
+def test_a_journal_removed_under_way_goes_on_in_a_new_segment(tmp_path):
     with Journal(tmp_path / "a.csv", HEADER, threaded=False, max_bytes=1_000_000) as journal:
         journal.path.unlink()
         write(journal, range(3_000))
@@ -170,7 +200,7 @@ def test_a_journal_that_is_removed_while_it_is_written_goes_on_in_a_new_segment(
     assert ticks
 
 
-def test_when_no_new_segment_can_be_begun_the_old_ones_stay_and_rows_are_lost(tmp_path, monkeypatch):
+def test_when_no_segment_can_be_begun_the_old_ones_stay(tmp_path, monkeypatch):
     journal = Journal(tmp_path / "a.csv", HEADER, threaded=False, max_bytes=1_000_000)
 
     def refuse(*_):
@@ -198,7 +228,7 @@ def child(code: str, *arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False, cwd=Path(__file__).parents[3])
 
 
-def test_a_disk_quota_that_is_reached_costs_rows_and_not_the_process(tmp_path):
+def test_a_disk_quota_costs_rows_and_not_the_process(tmp_path):
     done = child(
         "resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))\n"
         "journal = Journal(Path(sys.argv[1]), HEADER, threaded=False)\n"
@@ -210,7 +240,7 @@ def test_a_disk_quota_that_is_reached_costs_rows_and_not_the_process(tmp_path):
     assert record.ticks.tolist() == list(range(2000 - lost))
 
 
-def test_a_killed_process_leaves_what_it_had_written_within_a_moment(tmp_path):
+def test_a_killed_process_leaves_what_it_had_written(tmp_path):
     done = child(
         "import time\n"
         "journal = Journal(Path(sys.argv[1]), HEADER, threaded=True)\n"
@@ -225,7 +255,7 @@ def test_a_killed_process_leaves_what_it_had_written_within_a_moment(tmp_path):
     assert record.damaged == 0
 
 
-def test_the_disk_is_asked_to_confirm_once_a_second_and_at_the_end(tmp_path, monkeypatch):
+def test_the_disk_is_asked_to_confirm_each_second_and_at_the_end(tmp_path, monkeypatch):
     now_s, asked = [100.0], []
     monkeypatch.setattr("mtm_onboard.journal.journal.time.monotonic", lambda: now_s[0])
     monkeypatch.setattr("mtm_onboard.journal.journal.os.fsync", lambda descriptor: asked.append(now_s[0]))
@@ -262,10 +292,10 @@ def test_whatever_stands_behind_a_journal_s_rows_is_skipped(tmp_path_factory, ru
     assert record.ticks[:3].tolist() == [0, 1, 2]
 
 
-def test_the_noise_that_reached_the_robot_is_sent_less_base_where_it_was_sent(tmp_path):
+def test_the_noise_that_arrived_is_sent_less_base(tmp_path):
     with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
-        journal.append(0, 10.0, BASE, SENT, NOISE)
-        journal.append(1, 10.02, BASE, SENT, UNSENT)
+        journal.append(0, 10.0, BASE, SENT, NOISE, 0.0)
+        journal.append(1, 10.02, BASE, SENT, UNSENT, 0.0)
     noise = read_journal(journal.path).noise
     assert noise[0] == pytest.approx([0.05, -0.05, 1 / 3 - 0.3], abs=1e-8)
     assert not noise[1].any()

@@ -72,7 +72,6 @@ class Rig:
     wiring: Wiring
 
     def assemble(self, node_bus: can.BusABC | LineEnd, deadman_s: float | None, poll_s: float) -> None:
-        self.clock = SimulatedClock()
         self.plant = FloatingPlant()
         self.controller = MotionController(self.plant, deadman_s)
         self.node = CanMotionController(self.controller, node_bus)
@@ -86,7 +85,7 @@ class Rig:
         """Another transport to the same robot; raises MtmError while the wire is cut."""
         if self.wiring.is_cut:
             raise MtmError("no adapter there")
-        return RoboMasterCan(WiredBus(self.bus(), self.wiring, []))
+        return RoboMasterCan(WiredBus(self.bus(), self.wiring, []), clock=self.clock)
 
     def bus(self) -> can.BusABC | LineEnd:
         """Our end of the wire."""
@@ -118,7 +117,8 @@ class VirtualRig(Rig):
         self._channel = channel = next(_CHANNELS)
         self.wiring = Wiring()
         self.tap = can.Bus(interface="virtual", channel=channel)
-        self.transport = RoboMasterCan(interface="virtual", channel=channel)
+        self.clock = SimulatedClock()
+        self.transport = RoboMasterCan(interface="virtual", channel=channel, clock=self.clock)
         opened = self.transport._opened_bus
         self.transport._opened_bus = lambda: WiredBus(opened(), self.wiring, [])
         self._frames: list[can.Message] = []
@@ -143,7 +143,8 @@ class LineRig(Rig):
         robots_end, self._our_end = can_line()
         self.wiring = Wiring()
         self._frames: list[can.Message] = []
-        self.transport = RoboMasterCan(WiredBus(self._our_end, self.wiring, self._frames))
+        self.clock = SimulatedClock()
+        self.transport = RoboMasterCan(WiredBus(self._our_end, self.wiring, self._frames), clock=self.clock)
         self.assemble(robots_end, deadman_s, poll_s)
 
     def bus(self) -> LineEnd:

@@ -13,8 +13,8 @@ import pytest
 
 from hil.fleet.clock import SimulatedClock
 from hil.vehicles.motion_controller import MotionController
-from mtm_onboard.links.base import Transport
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.base import Link
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.runtime.ending_signals import ending_signals
@@ -31,7 +31,7 @@ class Rig:
     gives another transport to the same robot, which is not served by the clock yet.
     """
 
-    transport: Transport
+    transport: Link
     controller: MotionController
     plant: FloatingPlant
     clock: SimulatedClock
@@ -40,7 +40,7 @@ class Rig:
     clog: Callable[[], None] | None = field(default=None, kw_only=True)
     cut: Callable[[], None] | None = field(default=None, kw_only=True)
     mend: Callable[[], None] | None = field(default=None, kw_only=True)
-    remake: Callable[[], Transport] | None = field(default=None, kw_only=True)
+    remake: Callable[[], Link] | None = field(default=None, kw_only=True)
 
     def needs(self, *names):
         for name in names:
@@ -65,7 +65,7 @@ class Rig:
         return not self.controller.work_mode
 
 
-class TransportConformance:
+class LinkConformance:
     # Two velocities that the robot can have and that have little in common; others may be set for a robot's sake.
     askew = BodyVelocity(0.5, 0.2, 0.3)
     other = BodyVelocity(0.0, 0.5, 0.0)
@@ -165,7 +165,7 @@ class TransportConformance:
         rig.settle()
         assert rig.plant.position_xy_m == (0.0, 0.0)
 
-    def test_opening_again_after_a_stop_drives_again_but_does_not_resume(self, rig):
+    def test_opening_after_a_stop_drives_again_but_does_not_resume(self, rig):
         with rig.transport:
             rig.drive(BodyVelocity(0.5, 0.0, 0.0))
             rig.transport.stop()
@@ -189,7 +189,7 @@ class TransportConformance:
         assert rig.plant.velocity_body == STOP
         assert rig.is_released()
 
-    def test_a_deadman_at_the_far_end_outlives_the_commands_and_not_the_link(self, rig):
+    def test_a_far_deadman_outlives_the_commands_and_not_the_link(self, rig):
         rig.controller.deadman_s = 0.2
         with rig.transport:
             rig.drive(self.askew)
@@ -234,7 +234,7 @@ class TransportConformance:
         assert rig.plant.velocity_body == STOP
         assert rig.is_released()
 
-    def test_a_clogged_wire_holds_no_command_up_for_longer_than_the_write_bound(self, rig):
+    def test_a_clogged_wire_holds_a_command_no_longer_than_the_bound(self, rig):
         rig.needs("clog")
         durations_s = []
         rig.transport.open()
@@ -247,10 +247,10 @@ class TransportConformance:
         # A busy host may hold up single ones.
         assert median(durations_s) <= rig.transport.write_bound_s + 0.01
 
-    def test_a_link_that_comes_back_moves_the_robot_only_for_a_command_from_after_that(self, rig):
+    def test_a_link_that_is_back_obeys_only_commands_from_after(self, rig):
         rig.needs("cut", "mend", "remake")
         rig.controller.deadman_s = 0.2
-        link = ReconnectingTransport(rig.remake, rig.clock)
+        link = ReconnectingLink(rig.remake, rig.clock)
         rig.clock.every(link.service_period_s, link.service)
         with link:
             driven = Driven(link, rig.clock)

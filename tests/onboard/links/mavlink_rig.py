@@ -9,8 +9,8 @@ from hil.fleet.clock import SimulatedClock
 from hil.vehicles.mavlink_firmware import COPTER, PX4, ROVER
 from hil.vehicles.mavlink_vehicle import MavlinkVehicle
 from hil.wires.byte_pipe import byte_pipe
-from mtm_onboard.links.byte_link import ByteLink
-from mtm_onboard.links.mavlink import MavlinkTransport
+from mtm_onboard.links.byte_stream import ByteStream
+from mtm_onboard.links.mavlink import MavlinkLink
 from mtm_onboard.links.mavlink_ports import Port, StreamPort
 from mtm_onboard.model.velocity import STOP
 from mtm_onboard.protocol import MtmError
@@ -69,7 +69,7 @@ def mavlink_rig(profile="copter", *, ports=None, vehicle=None, **options) -> Mav
     ready = dict(is_guided=profile != "px4", is_armed=True, timestamp=timestamp)
     simulated = MavlinkVehicle(FIRMWARES[profile], plant, theirs, **(ready | (vehicle or {})))
     plain = dict(profile=profile, set_mode=profile == "px4", clock=clock, open_port=lambda: wire, timestamp=timestamp)
-    transport = MavlinkTransport(**(plain | options))
+    transport = MavlinkLink(**(plain | options))
     clock.every(0.010, simulated.poll)
     clock.every(transport.service_period_s, transport.service)
     return MavlinkRig(
@@ -83,7 +83,7 @@ def line_rig(profile="copter", **options) -> Iterator[MavlinkRig]:
     """The same over a stream of the kernel's, which can be clogged."""
     ours, theirs = socket.socketpair()
     with ours, theirs:
-        ports = [StreamPort(ByteLink(end.fileno(), lambda: None), 0.0025) for end in (ours, theirs)]
+        ports = [StreamPort(ByteStream(end.fileno(), lambda: None), 0.0025) for end in (ours, theirs)]
         rig = mavlink_rig(profile, ports=ports, **options)
 
         def clog():

@@ -11,16 +11,14 @@ from hil.fleet.clock import SimulatedClock
 from hil.vehicles.motion_controller import MotionController
 from hil.vehicles.plaintext_node import PlaintextMotionController
 from hil.wires.plaintext_ports import LinePort, Port, PtyPort, TcpPort
-from mtm_onboard.links.byte_link import ByteLink
+from mtm_onboard.links.byte_stream import ByteStream
 from mtm_onboard.links.robomaster_plaintext import RoboMasterPlaintext
 from mtm_onboard.links.robomaster_tcp import RoboMasterTcp
 from mtm_onboard.links.robomaster_uart import RoboMasterUart
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import MtmError
 from tests.hil.vehicles.floating_plant import FloatingPlant
-
-# The kernel passes bytes along in its own time, which the simulated clock waits for, briefly.
-PATIENCE_S = 5.0
+from tests.patience import PATIENCE_S
 
 
 class OverSocket(RoboMasterPlaintext):
@@ -30,8 +28,8 @@ class OverSocket(RoboMasterPlaintext):
         super().__init__()
         self._end = end
 
-    def _connect(self) -> ByteLink:
-        return ByteLink(self._end.fileno(), lambda: None)
+    def _connect(self) -> ByteStream:
+        return ByteStream(self._end.fileno(), lambda: None)
 
 
 class CountingPort:
@@ -71,7 +69,7 @@ class PlaintextRig:
         self.clock = SimulatedClock()
         self.plant = FloatingPlant()
         self.controller = MotionController(self.plant, deadman_s=None)
-        self.links: list[ByteLink] = []
+        self.links: list[ByteStream] = []
         self.ends: list[socket.socket] = []
         self.is_cut = False
         self._refusals = 0
@@ -144,7 +142,7 @@ class PlaintextRig:
         self.ends = [ours, theirs]
         return lambda: OverSocket(ours), LinePort(theirs.fileno(), lambda: None)
 
-    def _counted_link(self, connect: Callable[[], ByteLink]) -> ByteLink:
+    def _counted_link(self, connect: Callable[[], ByteStream]) -> ByteStream:
         self._check_wire()
         link = connect()
         write, read = link.write, link.read

@@ -10,19 +10,28 @@ from mtm_onboard.links.duml import MAX_LENGTH, OVERHEAD, Message, Parser, crc8, 
 # Frames written by DJI's SDK and three open libraries, or captured from a real robot; each names its source.
 GOLDEN = json.loads(Path(__file__).with_name("golden_duml.json").read_text(encoding="utf-8"))
 HOST = st.integers(0, 255)
-MESSAGES = st.builds(Message, HOST, HOST, st.integers(0, 65_535), HOST, HOST, HOST, st.binary(max_size=60))
-NEXT = Message(0x09, 0xC3, 7, 0x40, 0x3F, 0x19, b"\x01")
+MESSAGES = st.builds(
+    Message,
+    sender=HOST,
+    receiver=HOST,
+    sequence=st.integers(0, 65_535),
+    attributes=HOST,
+    cmdset=HOST,
+    cmdid=HOST,
+    payload=st.binary(max_size=60),
+)
+NEXT = Message(sender=0x09, receiver=0xC3, sequence=7, attributes=0x40, cmdset=0x3F, cmdid=0x19, payload=b"\x01")
 
 
 def golden_message(frame):
     return Message(
-        frame["sender"],
-        frame["receiver"],
-        frame["sequence"],
-        frame["attributes"],
-        frame["cmdset"],
-        frame["cmdid"],
-        bytes.fromhex(frame["payload"]),
+        sender=frame["sender"],
+        receiver=frame["receiver"],
+        sequence=frame["sequence"],
+        attributes=frame["attributes"],
+        cmdset=frame["cmdset"],
+        cmdid=frame["cmdid"],
+        payload=bytes.fromhex(frame["payload"]),
     )
 
 
@@ -49,7 +58,12 @@ def test_the_checksums_have_their_catalogue_values():
 
 @pytest.mark.parametrize(("length", "expected"), [(13, 0x33), (25, 0xE4), (155, 0x5A), (300, 0x68), (1023, 0xD9)])
 def test_the_header_of_a_length_has_the_published_checksum(length, expected):
-    assert encode(Message(9, 3, 0, 0, 0, 0, bytes(length - OVERHEAD)))[3] == expected
+    assert (
+        encode(
+            Message(sender=9, receiver=3, sequence=0, attributes=0, cmdset=0, cmdid=0, payload=bytes(length - OVERHEAD))
+        )[3]
+        == expected
+    )
 
 
 @given(MESSAGES)
@@ -66,7 +80,11 @@ def test_the_way_a_stream_is_cut_does_not_matter(messages, data):
 
 @given(st.binary(max_size=80), st.binary(max_size=80), MESSAGES)
 @example(encode(NEXT)[:9], encode(NEXT)[:3], NEXT)
-@example(encode(Message(0, 0, 0, 0, 0, 0, bytes(1010)))[:4], b"", NEXT)
+@example(
+    encode(Message(sender=0, receiver=0, sequence=0, attributes=0, cmdset=0, cmdid=0, payload=bytes(1010)))[:4],
+    b"",
+    NEXT,
+)
 def test_garbage_between_messages_costs_no_message(before, between, message):
     messages = Parser().feed(before + encode(message) + between + encode(NEXT))
     assert message in messages
@@ -91,9 +109,11 @@ def test_a_message_that_ends_early_costs_only_itself(message, data):
     assert Parser().feed(whole[:kept] + encode(NEXT)) == [NEXT]
 
 
-def test_a_header_that_is_sound_by_accident_does_not_hold_up_the_message_inside_its_claim():
+def test_a_header_sound_by_accident_hides_no_message():
     parser = Parser()
-    accident = encode(Message(0, 0, 0, 0, 0, 0, bytes(900)))[:4]
+    accident = encode(Message(sender=0, receiver=0, sequence=0, attributes=0, cmdset=0, cmdid=0, payload=bytes(900)))[
+        :4
+    ]
     assert parser.feed(accident + encode(NEXT)[:6]) == []
     assert parser.feed(encode(NEXT)[6:]) == [NEXT]
     assert parser.dropped_bytes == 4
@@ -102,14 +122,16 @@ def test_a_header_that_is_sound_by_accident_does_not_hold_up_the_message_inside_
 @given(st.lists(st.binary(min_size=1, max_size=300), max_size=20))
 def test_the_parser_never_keeps_a_whole_longest_message(portions):
     parser, fed = Parser(), 0
-    parser.feed(encode(Message(0, 0, 0, 0, 0, 0, bytes(1010)))[:4])
+    parser.feed(
+        encode(Message(sender=0, receiver=0, sequence=0, attributes=0, cmdset=0, cmdid=0, payload=bytes(1010)))[:4]
+    )
     for portion in portions:
         parser.feed(portion)
         fed += len(portion)
     assert 4 + fed - parser.dropped_bytes < MAX_LENGTH
 
 
-def test_an_aligned_message_fills_frames_of_eight_bytes_and_a_short_last_one():
+def test_an_aligned_message_fills_frames_of_eight_bytes():
     message = golden_message(next(f for f in GOLDEN if f["name"] == "CAN speed(0.5,0,0) c9->c3 noack seq2"))
     frames = ["551904e4c9c30200", "003f210000003f00", "00000000000000a2", "1f"]
     assert [frame.hex() for frame in segment(encode(message))] == frames
@@ -128,7 +150,12 @@ def test_a_packed_stream_is_read_across_frames():
 
 
 @pytest.mark.parametrize(
-    "message", [Message(0, 0, 0, 0, 0, 0, bytes(1011)), Message(256, 0, 0, 0, 0, 0), Message(0, 0, -1, 0, 0, 0)]
+    "message",
+    [
+        Message(sender=0, receiver=0, sequence=0, attributes=0, cmdset=0, cmdid=0, payload=bytes(1011)),
+        Message(sender=256, receiver=0, sequence=0, attributes=0, cmdset=0, cmdid=0),
+        Message(sender=0, receiver=0, sequence=-1, attributes=0, cmdset=0, cmdid=0),
+    ],
 )
 def test_what_does_not_fit_the_format_is_refused(message):
     with pytest.raises(ValueError, match=r"limit of 1010|does not fit"):
@@ -136,4 +163,6 @@ def test_what_does_not_fit_the_format_is_refused(message):
 
 
 def test_an_answer_goes_back_under_the_same_number():
-    assert NEXT.answer(b"\x00") == Message(0xC3, 0x09, 7, 0x80, 0x3F, 0x19, b"\x00")
+    assert NEXT.answer(b"\x00") == Message(
+        sender=0xC3, receiver=0x09, sequence=7, attributes=0x80, cmdset=0x3F, cmdid=0x19, payload=b"\x00"
+    )

@@ -8,7 +8,7 @@ from hil.fleet.clock import SimulatedClock
 from hil.plants.unicycle import UnicyclePlant
 from hil.vehicles.mavlink_firmware import ROVER
 from hil.vehicles.mavlink_vehicle import MavlinkVehicle
-from mtm_onboard.links.mavlink import MavlinkTransport
+from mtm_onboard.links.mavlink import MavlinkLink
 from mtm_onboard.links.mavlink_codec import MavlinkCodec
 from mtm_onboard.links.mavlink_ports import StreamPort, UdpPort, port_opener
 from mtm_onboard.model.velocity import STOP, BodyVelocity
@@ -28,7 +28,7 @@ def free_port():
     ["", "udpin:14550", "udp:127.0.0.1:14550", "udpout:127.0.0.1:0", "tcp:127.0.0.1:65536", "tcp::5760",
      "udpin:127.0.0.1:-1", "udpout:127.0.0.1:port"],
 )  # fmt: skip
-def test_an_endpoint_that_is_none_is_refused_before_anything_is_opened(endpoint):
+def test_a_wrong_endpoint_is_refused_before_anything_is_opened(endpoint):
     with pytest.raises(MtmError, match="give udpin:HOST:PORT"):
         port_opener(endpoint, 57_600, BOUND_S)
 
@@ -61,7 +61,7 @@ def test_a_serial_line_carries_frames_both_ways():
         os.close(slave)
 
 
-def test_a_tcp_connection_carries_frames_and_says_when_the_other_end_has_gone():
+def test_a_tcp_connection_carries_frames_until_the_end_is_gone():
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = port_opener(f"tcp:127.0.0.1:{server.getsockname()[1]}", 0, BOUND_S)()
         accepted, _ = server.accept()
@@ -76,7 +76,7 @@ def test_a_tcp_connection_carries_frames_and_says_when_the_other_end_has_gone():
         port.close()
 
 
-def test_a_listening_port_talks_to_nobody_until_it_has_settled_on_a_sender_and_then_to_nobody_else():
+def test_a_listening_port_settles_on_one_sender():
     listening = UdpPort(listen=("127.0.0.1", 0))
     vehicle, stranger = (UdpPort(peer=("127.0.0.1", listening.number)) for _ in range(2))
     try:
@@ -106,14 +106,14 @@ def test_a_closed_udp_port_says_so():
 
 
 @pytest.mark.parametrize("listens", ["transport", "vehicle"])
-def test_a_rover_is_driven_over_udp_whoever_listens_and_a_stranger_gets_nothing(listens):
+def test_a_rover_is_driven_over_udp_and_a_stranger_gets_nothing(listens):
     clock, number = SimulatedClock(), free_port()
     here = ("127.0.0.1", number)
     there = UdpPort(peer=here) if listens == "transport" else UdpPort(listen=here)
     plant = UnicyclePlant(lag_s=0.1)
     vehicle = MavlinkVehicle(ROVER, plant, there, is_guided=True, is_armed=True)
     kind = "udpin" if listens == "transport" else "udpout"
-    transport = MavlinkTransport(f"{kind}:127.0.0.1:{number}", profile="rover", clock=clock)
+    transport = MavlinkLink(f"{kind}:127.0.0.1:{number}", profile="rover", clock=clock)
     stranger = UdpPort(peer=here)
     other = MavlinkCodec(66, 1)
     clock.every(0.010, vehicle.poll)

@@ -6,8 +6,8 @@ The wrapper is served by the test itself, between commands, as its own thread wo
 import pytest
 
 from mtm_onboard.links.base import TakenOverError
-from mtm_onboard.links.mavlink import MavlinkTransport
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.mavlink import MavlinkLink
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
 from tests.onboard.links.mavlink_rig import mavlink_rig
@@ -22,12 +22,12 @@ class Link:
         self.rig = rig
 
         def make():
-            return MavlinkTransport(
+            return MavlinkLink(
                 profile=profile, set_mode=True, arm=True, open_timeout_s=2.0, clock=rig.clock,
                 open_port=lambda: rig.wire,
             )  # fmt: skip
 
-        self.transport = ReconnectingTransport(make, rig.clock)
+        self.transport = ReconnectingLink(make, rig.clock)
 
     def drive(self, seconds):
         end_s = self.rig.clock.now() + seconds
@@ -64,7 +64,7 @@ def test_a_lost_vehicle_is_driven_again_once_it_is_heard_again(link):
 
 
 @pytest.mark.parametrize("way", ["switches", "disarms"])
-def test_what_a_pilot_did_while_the_link_was_lost_is_never_undone(link, way):
+def test_what_a_pilot_did_during_an_outage_is_never_undone(link, way):
     rig, vehicle = link.rig, link.rig.vehicle
     with link.transport:
         link.drive(1.0)
@@ -111,7 +111,7 @@ def test_a_sideways_command_to_a_rover_is_no_lost_link():
         assert link.transport.losses == 0
 
 
-def test_a_first_opening_that_fails_is_an_error_and_is_not_tried_again():
+def test_a_first_opening_that_fails_is_not_tried_again():
     link = Link(mavlink_rig("copter", vehicle={"can_arm": False, "is_armed": False}), "copter")
     with pytest.raises(MtmError, match="not armed"):
         link.transport.open()

@@ -19,7 +19,7 @@ from mtm_onboard.model.velocity import STOP, BodyVelocity
 metres_a_second = st.floats(-3.5, 3.5)
 
 
-def test_a_speed_is_words_with_one_blank_between_them_in_the_robots_signs():
+def test_a_speed_is_words_in_the_robots_signs():
     assert speed_words(BodyVelocity(0.5, -0.25, math.radians(30))) == "chassis speed x 0.5000 y 0.2500 z -30.000"
 
 
@@ -111,7 +111,7 @@ def test_text_in_any_portions_gives_the_same_pieces(texts, cuts):
     assert pieces == texts
 
 
-def test_a_text_without_an_end_is_dropped_up_to_the_next_semicolon_and_counted_once():
+def test_a_text_without_an_end_is_dropped_and_counted_once():
     splitter = Splitter(longest=10)
     assert [splitter.feed(b"x" * 7) for _ in range(100)] == 100 * [[]]
     assert splitter.feed(b"x;ok;") == ["ok"]

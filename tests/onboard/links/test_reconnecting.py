@@ -11,8 +11,8 @@ from hil.vehicles.motion_controller import MotionController
 from hil.wires.slcan_port import SlcanPort
 from mtm_onboard.journal.journal import Journal
 from mtm_onboard.links.base import LinkBusyError, TakenOverError
-from mtm_onboard.links.none import NullTransport
-from mtm_onboard.links.reconnecting import ReconnectingTransport
+from mtm_onboard.links.none import NullLink
+from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import MtmError
@@ -22,17 +22,17 @@ from mtm_onboard.runtime.modulator import Modulator
 from tests.hil.vehicles.floating_plant import FloatingPlant
 from tests.onboard.driven import Driven
 from tests.onboard.links.can_rig import VirtualRig, can_rig
-from tests.onboard.links.conformance import Rig, TransportConformance
+from tests.onboard.links.conformance import LinkConformance, Rig
 from tests.onboard.schemes import small_codebook
 
 BASE = BodyVelocity(0.3, -0.1, 0.5)
 
 
-class TestReconnectingConforms(TransportConformance):
+class TestReconnectingConforms(LinkConformance):
     @pytest.fixture
     def rig(self):
         with can_rig(VirtualRig) as rig:
-            link = ReconnectingTransport(rig.remake, rig.clock)
+            link = ReconnectingLink(rig.remake, rig.clock)
             rig.clock.every(link.service_period_s, link.service)
             yield Rig(
                 link, rig.controller, rig.plant, rig.clock, lambda: sum(map(len, rig.sent())), clog=rig.clog,
@@ -59,13 +59,13 @@ class Bench:
     def times_s(self, name: str) -> list[float]:
         return [when_s for when_s, what in self.events if what == name]
 
-    def reconnecting(self, **options) -> ReconnectingTransport:
-        link = ReconnectingTransport(self.make, self.clock, **options)
+    def reconnecting(self, **options) -> ReconnectingLink:
+        link = ReconnectingLink(self.make, self.clock, **options)
         self.clock.every(link.service_period_s, link.service)
         return link
 
 
-class BenchLink(NullTransport):
+class BenchLink(NullLink):
     def __init__(self, bench: Bench) -> None:
         super().__init__()
         self.bench = bench
@@ -107,21 +107,21 @@ def bench():
     return Bench()
 
 
-def test_while_the_link_is_down_ticks_go_on_and_openings_are_tried_ever_more_rarely(bench):
+def test_while_the_link_is_down_ticks_go_on(bench):
     link = bench.reconnecting()
     link.open()
     driven = Driven(link, bench.clock)
     driven.run(0.1, BASE)
     bench.error, bench.is_absent = OSError("cable pulled"), True
     driven.run(20.0, BASE)
-    assert driven.stats.sent == 5 + 1000
+    assert (driven.stats.sent, driven.stats.unsent) == (5, 1000)
     assert (link.losses, link.dropped, driven.guard.unsent) == (1, 1000, 1000)
     assert link.fault == "no such port"
     pauses_s = np.diff([0.1, *bench.times_s("open")[1:]])
     assert pauses_s == pytest.approx([0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5.0, 5.0], abs=0.011)
 
 
-def test_a_robot_without_a_deadman_drives_on_for_half_a_second_at_most_once_it_can_be_reached_again(bench):
+def test_a_robot_reached_again_drives_on_for_half_a_second(bench):
     bench.has_deadman = False
     link = bench.reconnecting()
     assert not link.has_deadman
@@ -135,7 +135,7 @@ def test_a_robot_without_a_deadman_drives_on_for_half_a_second_at_most_once_it_c
 
 
 @pytest.mark.parametrize("where", ["error", "service_error"])
-def test_a_link_that_fails_is_told_to_stop_and_released_before_the_next_is_opened(bench, where):
+def test_a_link_that_fails_is_released_before_the_next(bench, where):
     with bench.reconnecting() as link:
         driven = Driven(link, bench.clock)
         driven.run(0.1, BASE)
@@ -149,7 +149,7 @@ def test_a_link_that_fails_is_told_to_stop_and_released_before_the_next_is_opene
         assert link.up_since_s == pytest.approx(0.2, abs=0.021)
 
 
-def test_no_motion_before_a_command_that_arrived_after_the_link_came_back(bench):
+def test_no_motion_before_a_command_from_after_the_return(bench):
     with bench.reconnecting() as link:
         driven = Driven(link, bench.clock, Modulator(small_codebook(), "a", (2,)))
         driven.run(0.5, BASE)
@@ -182,7 +182,7 @@ def through_an_outage(bench, modulator=None, limits=None) -> np.ndarray:
     return np.array(bench.commands)
 
 
-def test_motion_resumes_from_standstill_within_the_acceleration_limit(bench):
+def test_motion_resumes_within_the_acceleration_limit(bench):
     sent = through_an_outage(bench, limits=Limits(1.0, 2.0, acceleration_mps2=5.0))
     speeds_mps = np.vstack([[0.0, 0.0], sent[:, :2]])
     steps_mps = np.hypot(*np.diff(speeds_mps, axis=0).T)
@@ -191,13 +191,13 @@ def test_motion_resumes_from_standstill_within_the_acceleration_limit(bench):
     assert (sent[0].tolist(), sent[-1].tolist()) == (list(STOP), list(BASE))
 
 
-def test_after_an_outage_the_message_is_where_an_auditor_expects_it(bench):
+def test_after_an_outage_the_message_is_where_it_is_expected(bench):
     modulator = Modulator(small_codebook(), "a", (2,))
     sent = through_an_outage(bench, modulator)
     assert sent[-60:] == pytest.approx(np.array([modulator.add(tick, BASE) for tick in range(80, 140)]))
 
 
-def test_a_host_that_stalls_for_a_moment_loses_a_command_and_no_link(bench):
+def test_a_host_that_stalls_loses_a_command_and_no_link(bench):
     link = bench.reconnecting()
     link.open()
     driven = Driven(link, bench.clock)
@@ -212,7 +212,7 @@ def test_a_host_that_stalls_for_a_moment_loses_a_command_and_no_link(bench):
     assert link.losses == 1
 
 
-def test_a_link_that_never_holds_is_tried_ever_more_rarely_and_given_up(bench):
+def test_a_link_that_never_holds_is_given_up(bench):
     link = bench.reconnecting(give_up_s=8.0)
     link.open()
     driven = Driven(link, bench.clock)
@@ -244,7 +244,7 @@ def test_a_stop_that_got_through_as_the_link_went_down_is_enough(bench):
         driven.run(0.5, BASE)
 
 
-def test_a_link_that_comes_back_after_the_run_s_end_is_stopped_and_closed(bench):
+def test_a_link_back_after_the_run_s_end_is_stopped_and_closed(bench):
     link = bench.reconnecting()
     link.open()
     bench.service_error = OSError("no heartbeat")
@@ -267,7 +267,7 @@ def test_a_first_opening_that_fails_is_an_error_at_once(bench):
         bench.reconnecting().open()
 
 
-def test_an_impossible_command_is_the_caller_s_fault_and_not_the_link_s(bench):
+def test_an_impossible_command_is_the_caller_s_fault(bench):
     with bench.reconnecting() as link:
         bench.error = ValueError("beyond what the robot takes")
         with pytest.raises(ValueError, match="beyond"):
@@ -276,7 +276,7 @@ def test_an_impossible_command_is_the_caller_s_fault_and_not_the_link_s(bench):
         assert link.losses == 0
 
 
-def test_a_robot_that_somebody_takes_over_while_it_is_driven_is_not_opened_anew(bench):
+def test_a_robot_taken_over_while_driven_is_not_opened_anew(bench):
     link = bench.reconnecting()
     link.open()
     bench.error = TakenOverError("a pilot flies it")
@@ -288,7 +288,7 @@ def test_a_robot_that_somebody_takes_over_while_it_is_driven_is_not_opened_anew(
     assert (link.losses, len(bench.times_s("open"))) == (0, 1)
 
 
-def test_a_robot_that_somebody_takes_over_during_an_outage_is_not_opened_anew(bench):
+def test_a_robot_taken_over_in_an_outage_is_not_opened_anew(bench):
     link = bench.reconnecting()
     link.open()
     bench.service_error, bench.is_taken_over = OSError("radio silence"), True
@@ -297,8 +297,18 @@ def test_a_robot_that_somebody_takes_over_during_an_outage_is_not_opened_anew(be
     assert (link.losses, len(bench.times_s("open"))) == (1, 1)
 
 
-def test_the_journal_tells_of_the_outage_and_holds_nothing_that_was_not_sent(bench, tmp_path):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (2, 0, 0, 0), True, 50.0, 0.0, None)
+def test_the_journal_of_an_outage_holds_only_what_was_sent(bench, tmp_path):
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=(2, 0, 0, 0),
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     with (
         Journal(tmp_path / "a.csv", header, threaded=False) as journal,
         bench.reconnecting() as link,
@@ -327,10 +337,33 @@ def test_the_journal_tells_of_the_outage_and_holds_nothing_that_was_not_sent(ben
 
 def test_health_is_the_wrapper_s_and_the_link_s(bench):
     with bench.reconnecting() as link:
-        assert link.health() == {"link_up": True, "link_losses": 0, "dropped": 0}
+        assert link.health() == {
+            "link_up": True, "link_state": "up", "link_trouble": "", "link_losses": 0, "dropped": 0,
+        }  # fmt: skip
         bench.service_error, bench.is_absent = OSError("no heartbeat"), True
         bench.clock.sleep_until(0.5)
-        assert link.health() == {"link_up": False, "link_losses": 1, "dropped": 0}
+        assert link.health() == {
+            "link_up": False, "link_state": "down", "link_trouble": "no such port", "link_losses": 1, "dropped": 0,
+        }  # fmt: skip
+
+
+def test_a_degraded_link_is_up_and_says_why(bench):
+    with bench.reconnecting() as link:
+        link.link.degraded = "no telemetry"
+        health = link.health()
+        assert (health["link_up"], health["link_state"], health["link_trouble"]) == (True, "degraded", "no telemetry")
+
+
+def test_counters_go_on_over_all_the_links_that_were_used(bench, monkeypatch):
+    monkeypatch.setattr(BenchLink, "counters", lambda self: {"refusals": 2}, raising=False)
+    with bench.reconnecting() as link:
+        for _ in range(2):
+            bench.service_error = OSError("no heartbeat")
+            bench.clock.sleep_until(bench.clock.now() + 0.02)
+            bench.service_error = None
+            bench.clock.sleep_until(bench.clock.now() + 1.0)
+        assert link.counters() == {"link_losses": 2, "dropped": 0, "refusals": 6}
+        assert link.health()["refusals"] == 6
 
 
 phases = st.lists(
@@ -340,7 +373,7 @@ phases = st.lists(
 
 
 @given(phases)
-def test_whatever_the_link_goes_through_the_robot_moves_only_for_a_young_command_from_after_its_return(phases):
+def test_the_robot_moves_only_for_young_commands_from_after(phases):
     """Phases of so many ticks each, with or without base commands: what reached the robot, against when it may move."""
     bench = Bench()
     link = bench.reconnecting()
@@ -367,7 +400,8 @@ def test_whatever_the_link_goes_through_the_robot_moves_only_for_a_young_command
                     assert last_command_s > up_since_s
             up_since_s = math.inf if link.up_since_s is None else link.up_since_s
     assert driven.guard.unsent == link.dropped
-    assert driven.stats.sent == sum(ticks for _, _, ticks in phases)
+    assert driven.stats.unsent == link.dropped
+    assert driven.stats.sent + driven.stats.unsent == sum(ticks for _, _, ticks in phases)
 
 
 class Adapter:
@@ -392,7 +426,7 @@ class Adapter:
 
     def make(self) -> RoboMasterCan:
         path = "/dev/not-plugged-in" if self.port is None else self.port.path
-        return RoboMasterCan(interface="slcan", channel=path, sleep_after_open=0)
+        return RoboMasterCan(interface="slcan", channel=path, sleep_after_open=0, clock=self.clock)
 
     def _poll(self, now_s: float) -> None:
         if self.port is None:
@@ -401,9 +435,9 @@ class Adapter:
             self._node.poll(now_s)
 
 
-def test_a_serial_adapter_that_is_unplugged_and_plugged_in_again_drives_on():
+def test_an_adapter_plugged_in_again_drives_on():
     adapter = Adapter()
-    link = ReconnectingTransport(adapter.make, adapter.clock)
+    link = ReconnectingLink(adapter.make, adapter.clock)
     adapter.clock.every(link.service_period_s, link.service)
     forward = BodyVelocity(0.5, 0.0, 0.0)
     try:
@@ -428,9 +462,9 @@ def test_a_serial_adapter_that_is_unplugged_and_plugged_in_again_drives_on():
         adapter.unplug()
 
 
-def test_a_serial_adapter_that_stops_reading_is_a_lost_link_and_holds_up_no_tick():
+def test_an_adapter_that_stops_reading_is_a_lost_link():
     adapter = Adapter()
-    link = ReconnectingTransport(adapter.make, adapter.clock, give_up_s=math.inf)
+    link = ReconnectingLink(adapter.make, adapter.clock, give_up_s=math.inf)
     link.open()
     driven = Driven(link, adapter.clock)
     # Nobody polls the far end from here on, and nobody serves the link.

@@ -7,7 +7,7 @@ import pytest
 from mtm_onboard.model.clock import SystemClock
 
 
-def test_the_clock_never_runs_backwards_and_sleeps_until_its_deadline():
+def test_the_clock_never_runs_backwards():
     clock = SystemClock()
     before_s = clock.now()
     clock.sleep_until(before_s + 0.01)
@@ -28,7 +28,7 @@ def test_the_sleep_of_a_suspended_host_counts():
     assert SystemClock().now() == pytest.approx(time.clock_gettime(time.CLOCK_BOOTTIME), abs=1.0)
 
 
-def test_a_signal_is_handled_at_once_and_does_not_end_a_wait_early():
+def test_a_signal_is_handled_at_once_and_ends_no_wait():
     clock = SystemClock()
     deadline_s = clock.now() + 0.05
     handled_s = []

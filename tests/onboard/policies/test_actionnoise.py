@@ -74,7 +74,7 @@ def learned(library, noise, n_envs, steps, ends=()) -> np.ndarray:
     return np.array(rows)
 
 
-def test_the_noise_has_the_action_s_shape_and_the_channel_s_sigma():
+def test_the_noise_has_the_action_s_shape_and_sigma():
     noise = KeyedActionNoise(keyed())
     row = noise()
     assert (row.shape, row.dtype) == ((2,), np.float32)
@@ -87,7 +87,7 @@ def test_the_end_of_an_episode_does_not_restart_the_message(stable_baselines3):
     assert np.array_equal(rows[:, 0], added())
 
 
-def test_vectorised_environments_keep_their_own_phases_through_their_episodes_ends(stable_baselines3):
+def test_vectorised_environments_keep_their_own_phases(stable_baselines3):
     register_with_stable_baselines3()
     noise = VectorKeyedActionNoise(VectorKeyedNoise([keyed(), keyed(2, 40)]))
     rows = learned(stable_baselines3, noise, 2, 200, ends=[(13, 0), (70, 1), (71, 0)])
@@ -105,7 +105,7 @@ def test_once_registered_the_classes_pass_for_the_library_s_own(stable_baselines
     assert isinstance(several, stable_baselines3.VectorizedActionNoise)
 
 
-def test_a_noise_that_the_library_would_copy_for_several_environments_says_what_to_give_instead(stable_baselines3):
+def test_a_noise_that_would_be_copied_says_what_to_give_instead(stable_baselines3):
     register_with_stable_baselines3()
     with pytest.raises(MtmError, match="one for each environment"):
         learned(stable_baselines3, KeyedActionNoise(keyed()), 2, 1)

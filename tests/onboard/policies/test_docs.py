@@ -73,7 +73,7 @@ def test_the_programs_run_one_after_the_other(tmp_path, monkeypatch, capsys, lib
     programs = re.findall(r"^```python\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
     for program in programs:
         exec(program, names)
-    assert len(programs) == 4
+    assert len(programs) == 5
     assert "of 1 actions clipped" in capsys.readouterr().out
     assert names["bounds"].actions == 1
     assert libraries[0].shape == (3,)

@@ -21,7 +21,7 @@ def noise_of(secret=FAKE_SECRET, first_tick=0, message=(1,), **changes) -> Keyed
     return KeyedNoise([modulator], tick=ticks.__next__, random=np.random.default_rng(1))
 
 
-def test_a_policy_s_action_is_its_mean_and_the_keyed_noise_times_its_own_deviation():
+def test_an_action_is_the_mean_and_the_keyed_noise():
     policy = KeyedGaussian(lambda observation: (observation + MEAN, STD), noise_of())
     eps = noise_of()
     for step in range(130):
@@ -43,7 +43,7 @@ def actions_over_keys(first_tick: int, keys: int, **changes) -> np.ndarray:
 
 @pytest.mark.parametrize("tick", [0, 57, 119, 300])
 @pytest.mark.parametrize("band", [{}, TWO_TONES], ids=["many tones", "two tones"])
-def test_over_the_keys_an_action_s_distribution_is_the_policy_s_own(tick, band):
+def test_over_the_keys_an_action_has_the_policy_s_distribution(tick, band):
     standardised = (actions_over_keys(tick, 400, power="ensemble", **band) - MEAN) / STD
     for column in standardised.T:
         assert kstest(column, "norm").pvalue > 1e-3
@@ -54,7 +54,7 @@ def test_a_window_of_fixed_power_and_few_tones_is_not_gaussian():
     assert kstest(standardised[:, 0], "norm").pvalue < 1e-3
 
 
-def test_a_policy_without_noise_where_no_message_is_sent_is_refused():
+def test_a_policy_without_noise_outside_messages_is_refused():
     silent = KeyedNoise([Modulator(Codebook(FAKE_SECRET, small_scheme()), "a", (1,))])
     for noise in (silent, VectorKeyedNoise([noise_of(), silent])):
         with pytest.raises(MtmError, match="default_rng"):
@@ -72,7 +72,7 @@ def test_actions_beyond_the_bounds_are_clipped_and_counted():
 
 
 @given(arrays(np.float64, st.tuples(st.integers(1, 5), st.just(3)), elements=st.floats(-10, 10)))
-def test_bounds_count_each_environment_s_action_of_which_something_was_cut(actions):
+def test_bounds_count_each_environment_s_cut_action(actions):
     bounds = ActionBounds((-1.0, -2.0, -np.inf), (1.0, 2.0, 5.0))
     within = bounds.clip(actions)
     assert np.all((within >= (-1.0, -2.0, -np.inf)) & (within <= (1.0, 2.0, 5.0)))

@@ -48,7 +48,7 @@ def driven(env, action, steps) -> None:
             env.reset()
 
 
-def test_the_message_is_added_to_the_actions_and_goes_on_over_the_episodes():
+def test_the_message_goes_on_over_the_episodes():
     env = add_to_actions(Point(), keyed())
     driven(env, [0.3, -0.2], 230)
     assert isinstance(env, gymnasium.ActionWrapper)
@@ -56,7 +56,7 @@ def test_the_message_is_added_to_the_actions_and_goes_on_over_the_episodes():
     assert (env.bounds.actions, env.bounds.clipped) == (230, 0)
 
 
-def test_what_the_action_space_cuts_is_counted_and_reported_through_outer_wrappers():
+def test_what_the_action_space_cuts_is_counted_and_reported():
     env = gymnasium.wrappers.TimeLimit(add_to_actions(Point(0.35), keyed()), 1000)
     driven(env, [0.3, 0.0], 230)
     wanted = np.array([0.3, 0.0]) + played(230)
@@ -75,6 +75,18 @@ def test_environments_that_step_together_have_a_noise_each():
         envs.step(driven_together)
     for env, symbol in zip(envs.envs, (1, 2), strict=True):
         assert np.array(env.unwrapped.got) == pytest.approx(played(40, symbol), abs=1e-6)
+
+
+def test_a_step_that_only_resets_takes_its_tick_by_step_count():
+    # Gymnasium's vector environments reset in the step after an episode's end, and its action reaches nobody.
+    step = 0
+    noise = KeyedNoise([Modulator(small_codebook(), "a", (1,))], tick=lambda: step)
+    envs = SyncVectorEnv([lambda: add_to_actions(Point(), noise)])
+    envs.reset()
+    for step in range(153):  # noqa: B007 - the noise reads it
+        envs.step(np.zeros((1, 2), dtype=np.float32))
+    reached = [tick for tick in range(153) if tick not in (50, 101, 152)]
+    assert np.array(envs.envs[0].unwrapped.got) == pytest.approx(played(153)[reached], abs=1e-6)
 
 
 def test_actions_of_another_kind_are_refused():

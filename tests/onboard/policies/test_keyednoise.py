@@ -38,7 +38,7 @@ def test_channels_go_to_the_components_that_their_axes_name():
     assert noise.sigma.tolist() == [0.2, 0.0, 0.1, 0.1]
 
 
-def test_where_no_message_is_sent_the_noise_is_random_when_there_is_a_generator():
+def test_noise_is_random_outside_messages_with_a_generator():
     modulators = [modulator(repeat=False), modulator("b", SILENCE)]
     rows = steps(KeyedNoise(modulators, random=np.random.default_rng(1)), 3000)
     assert np.array_equal(rows[:120, :2], message(ticks=range(120)))
@@ -47,7 +47,7 @@ def test_where_no_message_is_sent_the_noise_is_random_when_there_is_a_generator(
         assert np.std(elsewhere) == pytest.approx(1.0, abs=0.06)
 
 
-def test_a_message_queued_while_a_policy_acts_begins_at_the_next_boundary():
+def test_a_queued_message_begins_at_the_next_boundary():
     playing = modulator(message=SILENCE)
     noise = KeyedNoise([playing])
     before = steps(noise, 50)
@@ -58,7 +58,7 @@ def test_a_message_queued_while_a_policy_acts_begins_at_the_next_boundary():
     assert np.array_equal(after[70:], message())
 
 
-def test_a_robot_s_ticks_come_from_its_clock_and_a_late_step_shifts_nothing():
+def test_a_late_step_shifts_nothing():
     ticks = [5, 6, 9, 9, 140]
     assert np.array_equal(steps(KeyedNoise([modulator()], tick=iter(ticks).__next__), 5), message(ticks=ticks))
 
@@ -78,7 +78,7 @@ def test_environments_have_their_own_keys_channels_and_phases():
     assert vector.sigma.tolist() == [[0.1, 0.1], [0.1, 0.1], [0.0, 0.2]]
 
 
-def test_environments_that_share_a_modulator_or_differ_in_size_are_refused():
+def test_environments_that_share_or_differ_are_refused():
     shared = modulator()
     with pytest.raises(MtmError, match="share a modulator"):
         VectorKeyedNoise([KeyedNoise([shared]), KeyedNoise([shared])])

@@ -78,7 +78,7 @@ def test_each_day_begins_an_epoch_whose_windows_count_from_zero():
                 assert not np.allclose(today.tones(channel, window), tomorrow_as_epoch.tones(channel, 0))
 
 
-def test_a_window_before_1970_is_refused_under_the_rolling_schedule_alone():
+def test_only_a_rolling_window_before_1970_is_refused():
     book = Codebook(FAKE_SECRET, scheme(schedule="rolling"), first_slot=2)
     channel = book.scheme.channels[1]
     book.tones(channel, -6, [0])
@@ -88,7 +88,7 @@ def test_a_window_before_1970_is_refused_under_the_rolling_schedule_alone():
     assert np.array_equal(fixed.tones(channel, -7), fixed.tones(channel, 0))
 
 
-def test_a_symbol_outside_the_alphabet_and_a_short_secret_are_refused():
+def test_a_wrong_symbol_and_a_short_secret_are_refused():
     book = Codebook(FAKE_SECRET, scheme())
     with pytest.raises(MtmError, match="choose 0 to 3"):
         book.tones(book.scheme.channels[0], 0, [4])

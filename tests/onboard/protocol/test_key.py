@@ -1,15 +1,22 @@
 import os
+from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_onboard.protocol import Channel, Key, MtmError, Scheme, generate_key, load_key, save_key
+from mtm_onboard.protocol import Channel, Codebook, Key, MtmError, Scheme, generate_key, load_key, save_key
 from mtm_onboard.protocol.key import key_text
 
 FAKE_SECRET = b"not a real secret, only for test"
 SCHEME = Scheme(
-    "test", 50.0, (0.5, 5.0), 4, 600, (Channel("a", "a", ("vx", "vy"), 2, 0.1), Channel("b", "b", ("vx",), 3, 0.1))
+    name="test",
+    rate_hz=50.0,
+    band_hz=(0.5, 5.0),
+    alphabet_size=4,
+    message_ticks=600,
+    channels=(Channel("a", "a", ("vx", "vy"), 2, 0.1), Channel("b", "b", ("vx",), 3, 0.1)),
 )
 
 
@@ -27,7 +34,7 @@ def edited(path, old, new):
     return path
 
 
-def test_a_key_file_returns_what_was_saved_and_only_its_owner_reads_it(written):
+def test_only_its_owner_reads_a_key_file(written):
     assert load_key(written) == Key("fleet-7", FAKE_SECRET, SCHEME)
     assert os.stat(written).st_mode & 0o777 == 0o600
 
@@ -75,7 +82,7 @@ def test_an_existing_key_file_is_never_overwritten(written):
         ('name = "b"', 'name = "a"', "same name"),
     ],
 )
-def test_a_bad_key_file_is_refused_in_one_sentence_that_says_what_to_change(written, old, new, says):
+def test_a_bad_key_file_says_what_to_change(written, old, new, says):
     with pytest.raises(MtmError, match=says) as refusal:
         load_key(edited(written, old, new))
     assert "\n" not in str(refusal.value)
@@ -102,8 +109,27 @@ def test_missing_folder_and_binary_files_are_refused(tmp_path):
     binary = tmp_path / "binary.key"
     binary.write_bytes(bytes(range(128, 256)))
     os.chmod(binary, 0o600)
-    with pytest.raises(MtmError, match="not text"):
+    with pytest.raises(MtmError, match="not valid TOML"):
         load_key(binary)
+
+
+def test_a_scheme_that_is_no_table_is_refused(written):
+    text = written.read_text()
+    written.write_text(text[: text.index("[scheme]")] + "scheme = 3\n")
+    with pytest.raises(MtmError, match="the scheme must be a table"):
+        load_key(written)
+
+
+def test_what_is_no_regular_file_is_refused():
+    with pytest.raises(MtmError, match="/dev/null is not a file .*; name the key file"):
+        load_key(Path("/dev/null"))
+
+
+def test_a_key_s_codebook_is_that_of_its_secret_and_scheme():
+    key = Key("fake-key", FAKE_SECRET, SCHEME)
+    channel, own = SCHEME.channels[0], Codebook(FAKE_SECRET, SCHEME, 5)
+    assert np.array_equal(key.codebook(5).samples(channel, 1), own.samples(channel, 1))
+    assert (key.codebook().first_slot, key.codebook(5).first_slot) == (0, 5)
 
 
 def test_key_ids_are_plain_words():

@@ -18,7 +18,7 @@ times_s = st.floats(0.0, 4e9)
 slots = st.integers(0, 10**9)
 
 
-def test_slots_are_counted_from_the_unix_epoch_and_a_slot_is_one_message_long():
+def test_slots_are_a_message_long_from_the_unix_epoch_on():
     scheme = small_scheme(message_ticks=120)
     assert [slot_at(unix_s, scheme) for unix_s in (0.0, 2.39, 2.4, 24.0)] == [0, 0, 1, 10]
     assert slot_start_unix_s(10, scheme) == 24.0
@@ -37,13 +37,13 @@ def test_a_slot_is_under_way_at_its_own_start(scheme, slot):
 
 
 @given(schemes, times_s)
-def test_the_next_slot_is_the_first_that_starts_no_earlier_than_by_a_microsecond(scheme, unix_s):
+def test_the_next_slot_is_early_by_a_microsecond_at_most(scheme, unix_s):
     slot = next_slot(unix_s, scheme)
     assert slot_start_unix_s(slot - 1, scheme) < unix_s <= slot_start_unix_s(slot, scheme) + 1.1e-6
 
 
 @given(schemes, slots)
-def test_the_next_slot_at_a_start_written_in_decimals_is_that_slot(scheme, slot):
+def test_the_next_slot_at_a_decimal_start_is_that_slot(scheme, slot):
     assert next_slot(float(f"{slot_start_unix_s(slot, scheme):.6f}"), scheme) == slot
 
 
@@ -61,7 +61,7 @@ def test_slots_count_from_zero_in_each_epoch_and_without_a_gap(scheme, slot):
 
 
 @given(schemes, st.integers(1, 40_000))
-def test_the_slot_across_midnight_belongs_to_the_day_before_whole(scheme, day):
+def test_the_slot_across_midnight_is_of_the_day_before(scheme, day):
     midnight_s = float(day * EPOCH_S)
     first = next_slot(midnight_s, scheme)
     assert epoch_of_slot(first, scheme) == (day, 0)
@@ -90,3 +90,8 @@ def test_what_is_no_time_is_refused(unix_s):
 def test_a_slot_before_1970_has_no_epoch():
     with pytest.raises(MtmError, match="set the clock"):
         epoch_of_slot(-1, SCHEMES[0])
+
+
+def test_a_microsecond_after_its_start_a_slot_is_still_the_next():
+    scheme = small_scheme(message_ticks=120)
+    assert [next_slot(unix_s, scheme) for unix_s in (0.0, 1e-6, 2e-6)] == [0, 0, 1]

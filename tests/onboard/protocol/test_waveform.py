@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mtm_onboard.protocol.keystream import stream
 from mtm_onboard.protocol.scheme import count_bins, shortest_window
-from mtm_onboard.protocol.waveform import draw_tones, evaluate, phasors, tone_bins
+from mtm_onboard.protocol.waveform import draw_tones, evaluate, evaluate_window, phasors, tone_basis, tone_bins
 
 VECTORS = json.loads((Path(__file__).parent / "waveform_v1.json").read_text())
 
@@ -100,3 +100,47 @@ def test_a_stream_refuses_what_it_cannot_encode():
         stream(bytes(32), "symbol", (-1,), 8)
     with pytest.raises(ValueError, match="255"):
         stream(bytes(32), "", (), 8)
+
+
+@pytest.mark.parametrize(("ticks", "bins"), [(10, [1, 2, 3, 4]), (11, [1, 2, 3, 4, 5]), (2, []), (1, [])])
+def test_no_bin_reaches_half_the_rate_whatever_the_band(ticks, bins):
+    assert tone_bins(ticks, 50.0, (1.0, 1000.0)).tolist() == bins
+
+
+def test_bins_are_shared_and_nobody_can_write_to_them():
+    with pytest.raises(ValueError, match="read-only"):
+        tone_bins(20, 50.0, (2.0, 20.0))[0] = 3
+
+
+@given(st.integers(5, 400), st.integers(0, 100), st.sampled_from(["window", "ensemble"]))
+def test_a_whole_window_is_the_formula_at_its_ticks(ticks, symbol, power):
+    bins = tone_bins(ticks, 50.0, (2.0, 24.0))
+    tones = phasors(*draw_tones(bytes(32), 0, 0, symbol, 0, len(bins)), power)
+    formula = evaluate(tones, bins, ticks, np.arange(ticks))
+    np.testing.assert_allclose(evaluate_window(tones, bins, ticks), formula, rtol=0, atol=1e-12)
+
+
+def test_a_late_tick_has_the_phase_of_its_place_in_the_window():
+    bins = tone_bins(100, 50.0, (0.5, 5.0))
+    late = 100 * 10**12
+    assert np.array_equal(tone_basis(bins, 100, np.array([late + 7])), tone_basis(bins, 100, np.array([7])))
+
+
+def test_a_stream_of_zeros_is_the_loudest_tone_there_is(monkeypatch):
+    monkeypatch.setattr("mtm_onboard.protocol.waveform.stream", lambda *asked: bytes(asked[-1]))
+    amplitudes, phases_rad = draw_tones(bytes(32), 0, 0, 0, 0, 3)
+    # The middle of the first of 2 ** 53 steps.
+    assert amplitudes == pytest.approx([np.sqrt(2.0 * 54.0 * np.log(2.0))] * 3)
+    assert phases_rad.tolist() == [0.0] * 3
+
+
+def test_many_windows_at_once_are_each_window_by_itself():
+    bins = tone_bins(50, 50.0, (2.0, 20.0))
+    drawn = [[draw_tones(bytes(32), 0, 0, symbol, axis, len(bins)) for axis in range(3)] for symbol in range(2)]
+    amplitudes, phases_rad = (np.array([[axis[part] for axis in row] for row in drawn]) for part in (0, 1))
+    together = evaluate_window(phasors(amplitudes, phases_rad, "window"), bins, 50)
+    assert together.shape == (2, 3, 50)
+    for symbol in range(2):
+        for axis in range(3):
+            alone = phasors(amplitudes[symbol, axis], phases_rad[symbol, axis], "window")
+            np.testing.assert_allclose(together[symbol, axis], evaluate_window(alone, bins, 50), atol=1e-12)

@@ -1,9 +1,11 @@
 import re
+import sys
 from pathlib import Path
 
 import pytest
 
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.ros.node import main
 from mtm_onboard.ros.parameters import DEFAULTS, config_of, key_path, plan_of
 from mtm_onboard.runtime.config import ControlSettings, JournalSettings, Robot
 from mtm_onboard.runtime.guard import Limits, Staleness
@@ -74,3 +76,9 @@ def test_the_documented_parameters_are_those_there_are():
     assert named == DEFAULTS.keys() | {"cmd_vel", "cmd_vel_out", "~/stop"}
     for name in ("noise_off_s", "stopped_s"):
         assert f"`{name}` ({DEFAULTS[name]})" in PAGE
+
+
+def test_without_ros_the_node_says_what_to_source(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "rclpy", None)
+    assert main([]) == 1
+    assert "source its setup file first" in capsys.readouterr().err

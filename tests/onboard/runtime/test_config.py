@@ -1,14 +1,15 @@
-import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_onboard.links.factory import make_transport
-from mtm_onboard.links.none import NullTransport
+from mtm_onboard.links.factory import make_link
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import STOP
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.input_file import BrokenTextError
 from mtm_onboard.runtime.config import (
     ControlSettings,
     JournalSettings,
@@ -20,7 +21,8 @@ from mtm_onboard.runtime.config import (
 )
 from mtm_onboard.runtime.guard import Limits, Staleness
 
-EXAMPLE = Path(__file__).parents[3] / "docs" / "robot.example.toml"
+EXAMPLES = Path(__file__).parents[3] / "examples/robots"
+EXAMPLE = EXAMPLES / "none.toml"
 
 
 def table(**sections):
@@ -34,16 +36,39 @@ def table(**sections):
     return {name: section for name, section in merged.items() if section is not None}
 
 
+def test_base_commands_come_over_a_unix_socket_by_default():
+    source = config_from_table(table(source={"socket": "r.base"})).source
+    assert source == SourceSettings("unix", "r.base")
+    assert str(source) == "the socket r.base"
+
+
 def test_the_documented_example_says_what_it_says():
     config = load_config(EXAMPLE)
     assert config.robot == Robot("robot0", "robot0")
-    assert config.transport_kind == "robomaster-can"
-    assert config.transport_options == {"interface": "slcan", "channel": "/dev/ttyACM0", "bitrate": 1_000_000}
+    assert (config.transport_kind, config.transport_options) == ("none", {})
     assert config.limits == Limits(1.0, 2.0, noise_sigmas=4.0)
     assert config.staleness == Staleness(0.1, 0.25)
-    assert config.source == SourceSettings("udp", 5005)
+    assert config.source == SourceSettings("unix", "robot0.base")
     assert config.journal == JournalSettings("robot0.csv", max_mb=200)
     assert config.link == LinkSettings(reconnect=True, give_up_s=60)
+    assert config.control == ControlSettings("robot0.sock")
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.iterdir()), ids=lambda path: path.stem)
+def test_there_is_an_example_of_each_link_which_makes_that_link(path):
+    config = load_config(path)
+    assert config.transport_kind == path.stem
+    assert make_link(config.transport_kind, config.transport_options).health is not None
+    # Else they are as the one that explains them.
+    assert replace(config, transport_kind="none", transport_options={}) == load_config(EXAMPLE)
+
+
+def test_every_kind_of_link_has_an_example():
+    with pytest.raises(MtmError) as refused:
+        make_link("no such kind", {})
+    kinds = str(refused.value).partition("choose one of: ")[2].split(", ")
+    assert kinds
+    assert {path.stem for path in EXAMPLES.iterdir()} == set(kinds)
 
 
 def test_the_defaults_are_those_that_the_example_documents():
@@ -52,6 +77,7 @@ def test_the_defaults_are_those_that_the_example_documents():
     assert config.limits.noise_sigmas == load_config(EXAMPLE).limits.noise_sigmas
     assert config.link == load_config(EXAMPLE).link
     assert config.journal is None
+    assert config.control is None
 
 
 @pytest.mark.parametrize(
@@ -70,9 +96,13 @@ def test_the_defaults_are_those_that_the_example_documents():
         ({"limits": {"speed_mps": -1.0, "turn_rate_radps": 1.0}}, "above zero"),
         ({"limits": {"speed_mps": float("nan"), "turn_rate_radps": 1.0}}, "above zero"),
         ({"stale": {"noise_off_s": 0.3}}, "noise off before the stop"),
-        ({"source": {"kind": "radio"}}, "choose one of: udp, stdin"),
+        ({"source": {"kind": "radio"}}, "choose one of: unix, udp, stdin"),
         ({"source": {"kind": "udp"}}, "port belongs to kind udp"),
         ({"source": {"kind": "stdin", "port": 5005}}, "port belongs to kind udp"),
+        ({"source": {"port": 5005}}, "socket belongs to kind unix"),
+        ({"source": {}}, "socket belongs to kind unix"),
+        ({"source": {"socket": ""}}, "socket belongs to kind unix"),
+        ({"source": {"kind": "udp", "port": 5005, "socket": "r.base"}}, "socket belongs to kind unix"),
         ({"source": {"kind": "udp", "port": 70_000}}, "choose 1 to 65535"),
         ({"source": {"kind": "udp", "port": 5005.0}}, "give a whole number"),
         ({"journal": {}}, "lacks path"),
@@ -125,22 +155,22 @@ def test_files_that_hold_no_configuration_are_refused(tmp_path):
     path.write_text("speed = ")
     with pytest.raises(MtmError, match="correct that line") as caught:
         load_config(path)
-    assert isinstance(caught.value.__cause__, tomllib.TOMLDecodeError)
+    assert isinstance(caught.value.__cause__, BrokenTextError)
     path.write_text("[robot]\nname = 'r'\n")
     with pytest.raises(MtmError, match=r"robot.toml: the section \[transport\] is missing"):
         load_config(path)
 
 
 def test_the_factory_makes_what_the_configuration_names():
-    assert isinstance(make_transport("none", {}), NullTransport)
+    assert isinstance(make_link("none", {}), NullLink)
     with pytest.raises(MtmError, match="choose one of: none, robomaster-can"):
-        make_transport("tachyon", {})
+        make_link("tachyon", {})
     with pytest.raises(MtmError, match=r"correct \[transport\]"):
-        make_transport("none", {"bitrate": 1_000_000})
+        make_link("none", {"bitrate": 1_000_000})
 
 
 def test_a_dry_run_s_link_counts_and_refuses_what_is_not_finite():
-    link = NullTransport()
+    link = NullLink()
     with link:
         link.send(STOP)
         with pytest.raises(ValueError, match="finite"):

@@ -1,9 +1,12 @@
+from unittest.mock import patch
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mtm_onboard.protocol import Channel, Key, MtmError
 from mtm_onboard.protocol.framing import Framing, decode_frame, frame_order, symbols_of_number
+from mtm_onboard.runtime import message as module
 from mtm_onboard.runtime.message import FramedMessage, PlainMessage, content_from_table, message_of
 from tests.onboard.schemes import FAKE_SECRET, small_scheme
 
@@ -26,7 +29,7 @@ def in_frame_order(played, scheme, slot) -> list[int]:
 
 
 @given(st.integers(0, 20 * DAY), st.integers(0, 20))
-def test_a_framed_message_is_read_in_every_slot_with_the_epoch_of_its_day(slot, number):
+def test_a_framed_message_has_the_epoch_of_its_day(slot, number):
     key = key_of()
     played = FramedMessage("hi", key, number).symbols(slot)
     frame = decode_frame(in_frame_order(played, key.scheme, slot), key.scheme, key.secret, epoch=4 + slot // DAY)
@@ -42,7 +45,7 @@ def test_the_tag_changes_at_midnight_and_only_then():
     assert message.symbols(0) == days[0]
 
 
-def test_under_the_fixed_schedule_every_slot_is_the_same_and_of_the_scheme_s_epoch():
+def test_a_fixed_message_is_the_same_in_every_slot():
     key = key_of(schedule="fixed")
     message = FramedMessage("hi", key)
     assert message.symbols(0) == message.symbols(3 * DAY + 1)
@@ -50,14 +53,31 @@ def test_under_the_fixed_schedule_every_slot_is_the_same_and_of_the_scheme_s_epo
     assert frame.payload == "hi"
 
 
-def test_an_interleaved_message_is_dealt_differently_from_slot_to_slot():
+def test_a_frame_is_encoded_once_a_day():
+    message = FramedMessage("hi", key_of())
+    with patch.object(module, "encode_frame", wraps=module.encode_frame) as encode:
+        for slot in (0, 1, 2, DAY, DAY + 1, 0):
+            message.symbols(slot)
+    # The first day's was made with the message.
+    assert encode.call_count == 2
+
+
+def test_messages_count_from_zero():
+    key = key_of()
+    assert (PlainMessage((0,) * 24).number, FramedMessage("hi", key).number) == (0, 0)
+    played = FramedMessage("hi", key).symbols(0)
+    assert decode_frame(in_frame_order(played, key.scheme, 0), key.scheme, key.secret, epoch=4).number == 0
+    assert message_of("hi", key).number == 0
+
+
+def test_an_interleaved_message_differs_from_slot_to_slot():
     message = FramedMessage("hi", key_of())
     assert message.symbols(10) != message.symbols(11)
 
 
 def test_a_scheme_without_framing_carries_numbers_and_symbols():
     key = key_of(None)
-    assert message_of(77, key, 2) == PlainMessage(symbols_of_number(77, key.scheme), 2)
+    assert message_of(77, key, 2) == PlainMessage(symbols_of_number(77, key.scheme), 2, 77)
     assert message_of((1,) * 24, key).symbols(5) == (1,) * 24
 
 

@@ -22,14 +22,14 @@ def played(modulator: Modulator, ticks) -> np.ndarray:
     return np.array(rows)
 
 
-def test_the_message_is_its_symbols_waveforms_one_after_the_other():
+def test_the_message_is_its_symbols_waveforms_in_a_row():
     book = small_codebook()
     channel = book.scheme.channel("b")
     expected = np.concatenate([book.samples(channel, window, [symbol])[0].T for window, symbol in enumerate((3, 0, 2))])
     assert np.array_equal(played(Modulator(book, "b", (3, 0, 2)), range(120)), expected)
 
 
-def test_a_repeated_message_starts_again_and_one_that_is_not_ends_in_silence():
+def test_a_message_repeats_or_ends_in_silence():
     again = Modulator(small_codebook(), "b", (3, 0, 2))
     once = Modulator(small_codebook(), "b", (3, 0, 2), repeat=False)
     assert np.array_equal(played(again, range(120, 240)), played(again, range(120)))
@@ -54,7 +54,7 @@ def test_ticks_that_never_come_shift_nothing(schedule):
     assert np.array_equal(played(Modulator(small_codebook(schedule=schedule), "b", (3, 0, 2)), kept), whole[kept])
 
 
-def test_a_rolling_schedule_plays_no_window_twice_while_the_symbols_repeat():
+def test_a_rolling_schedule_plays_no_window_twice():
     book = small_codebook(schedule="rolling")
     windows = played(Modulator(book, "b", (3, 0, 2)), range(40 * 30)).reshape(30, 40)
     correlation = np.corrcoef(windows)
@@ -81,7 +81,7 @@ def test_a_perturbation_is_a_view_that_nobody_can_write_to():
         noise[0] = 1.0
 
 
-def test_added_noise_has_the_scheme_s_sigma_on_the_channel_s_axes_alone():
+def test_noise_has_the_scheme_s_sigma_on_the_channel_s_axes():
     modulator = Modulator(small_codebook(), "a", (1,))
     sent = np.array([modulator.add(tick, BASE) for tick in range(120)])
     noise = np.array([modulator.perturbation(tick) for tick in range(120)])
@@ -96,7 +96,7 @@ def test_a_gaussian_policy_takes_the_keyed_noise_for_its_own():
     assert modulator.substitute(7, mean, sigma) == pytest.approx(mean + sigma * modulator.perturbation(7))
 
 
-def test_a_channel_of_joints_serves_a_policy_but_no_body_velocity():
+def test_a_channel_of_joints_serves_no_body_velocity():
     book = small_codebook(channels=(Channel("arm", "arm", ("shoulder", "elbow"), 1, 0.1),))
     modulator = Modulator(book, "arm", (1,))
     assert modulator.substitute(3, np.zeros(2), 1.0) == pytest.approx(modulator.perturbation(3))
@@ -115,7 +115,7 @@ def changing(schedule: str, at_tick: int, ticks: int, **options) -> tuple[np.nda
 
 @pytest.mark.parametrize("schedule", ["fixed", "rolling"])
 @pytest.mark.parametrize(("at_tick", "boundary"), [(-5, 0), (0, 120), (1, 120), (119, 120), (120, 240), (230, 240)])
-def test_a_queued_message_takes_effect_exactly_at_the_next_boundary(schedule, at_tick, boundary):
+def test_a_queued_message_takes_effect_at_the_next_boundary(schedule, at_tick, boundary):
     book = small_codebook(schedule=schedule)
     one, other = (played(Modulator(book, "b", symbols), range(480)) for symbols in ((3, 0, 2), (1, 1, 3)))
     noise, start_tick = changing(schedule, at_tick, 480)
@@ -124,7 +124,7 @@ def test_a_queued_message_takes_effect_exactly_at_the_next_boundary(schedule, at
 
 
 @pytest.mark.parametrize("schedule", ["fixed", "rolling"])
-def test_a_queued_message_that_is_not_repeated_follows_the_silence_and_ends_in_silence(schedule):
+def test_a_queued_message_that_ends_follows_and_leaves_silence(schedule):
     noise, start_tick = changing(schedule, 200, 600, repeat=False)
     assert start_tick == 240
     silent = ~noise.any(axis=1)
@@ -135,7 +135,7 @@ def test_a_queued_message_that_is_not_repeated_follows_the_silence_and_ends_in_s
 
 @pytest.mark.parametrize("schedule", ["fixed", "rolling"])
 @pytest.mark.parametrize("first", [(3, 0, 2), SILENCE])
-def test_nothing_is_derived_in_the_tick_that_sends_when_the_message_changes(schedule, first):
+def test_nothing_is_derived_while_sending_when_messages_change(schedule, first):
     book = small_codebook(schedule=schedule)
     modulator = Modulator(book, "b", first)
     changes = {50: (2, 1, 2), 119: (3, 1, 2), 200: SILENCE, 290: (0, 1, 2)}
@@ -148,7 +148,7 @@ def test_nothing_is_derived_in_the_tick_that_sends_when_the_message_changes(sche
 
 
 @pytest.mark.parametrize("schedule", ["fixed", "rolling"])
-def test_a_run_begun_in_silence_plays_what_it_is_sent_from_the_boundary_on_until_silence_is_sent(schedule):
+def test_a_silent_run_speaks_from_the_boundary_until_silence(schedule):
     book = small_codebook(schedule=schedule)
     modulator = Modulator(book, "b", SILENCE)
     assert modulator.message is SILENCE
@@ -183,7 +183,7 @@ def test_a_stall_across_the_boundary_of_a_change_shifts_nothing(schedule):
     st.none() | st.just(SILENCE) | st.integers(0, 3),
     st.lists(st.tuples(st.integers(1, 90), st.none() | st.just(SILENCE) | st.integers(0, 3)), max_size=40),
 )
-def test_whatever_is_queued_and_missed_each_tick_has_its_own_message_s_noise(schedule, tick, first, steps):
+def test_each_tick_has_its_own_message_s_noise_whatever_comes(schedule, tick, first, steps):
     book = small_codebook(schedule=schedule)
     channel = book.scheme.channel("a")
     first = SILENCE if first is None else first
@@ -204,7 +204,7 @@ def test_whatever_is_queued_and_missed_each_tick_has_its_own_message_s_noise(sch
             starts[max(0, tick // 120 + 1)] = symbol
 
 
-def test_the_last_of_several_queued_before_a_boundary_is_played_and_each_hears_the_same_start():
+def test_the_last_queued_before_a_boundary_is_played():
     book = small_codebook()
     modulator = Modulator(book, "a", (0,))
     first = modulator.queue((1,))
@@ -217,7 +217,7 @@ def test_the_last_of_several_queued_before_a_boundary_is_played_and_each_hears_t
     assert (modulator.message, modulator.waiting) == ((3,), None)
 
 
-def test_what_no_tick_has_taken_up_can_be_withdrawn_and_nothing_else():
+def test_only_what_no_tick_has_taken_up_can_be_withdrawn():
     modulator = Modulator(small_codebook(), "a", (0,))
     queued = modulator.queue((1,))
     assert queued.start_tick(0.0) is None
@@ -229,7 +229,7 @@ def test_what_no_tick_has_taken_up_can_be_withdrawn_and_nothing_else():
     assert modulator.waiting == (2,)
 
 
-def test_a_wrong_message_is_refused_when_it_is_queued_and_the_present_one_goes_on():
+def test_a_wrong_message_is_refused_and_the_present_goes_on():
     modulator = Modulator(small_codebook(), "a", (0,))
     with pytest.raises(MtmError, match="outside the alphabet"):
         modulator.queue((4,))
@@ -239,7 +239,7 @@ def test_a_wrong_message_is_refused_when_it_is_queued_and_the_present_one_goes_o
     assert modulator.message == (0,)
 
 
-def test_a_whole_message_gives_each_channel_its_part_of_the_slot_at_hand():
+def test_a_whole_message_gives_each_channel_its_part():
     book = small_codebook(schedule="rolling", first_slot=36_000 - 2)
     modulator = Modulator(book, "b", Counting())
     noise = played(modulator, range(120 * 5)).reshape(5, 3, 40)
@@ -266,3 +266,49 @@ def test_a_wrong_channel_and_wrong_symbols_are_refused():
         Modulator(small_codebook(), "b", (1,))
     with pytest.raises(MtmError, match="choose 0 to 3"):
         Modulator(small_codebook(), "a", (4,))
+
+
+def test_silence_is_a_view_that_nobody_can_write_to():
+    modulator = Modulator(small_codebook(), "a", SILENCE)
+    with pytest.raises(ValueError, match="read-only"):
+        modulator.perturbation(5)[0] = 1.0
+
+
+def test_whoever_asks_again_for_the_start_hears_it_again():
+    modulator = Modulator(small_codebook(), "a", (0,))
+    queued = modulator.queue((1,))
+    played(modulator, [0])
+    assert [queued.start_tick(0.0), queued.start_tick(0.0)] == [120, 120]
+
+
+@pytest.mark.parametrize("axes", [("vx", "vy", "wz"), ("wz", "vx"), ("vy",)])
+def test_noise_goes_to_the_axes_that_the_channel_names(axes):
+    modulator = Modulator(small_codebook(channels=(Channel("a", "a", axes, 1, 0.1),)), "a", (1,))
+    added = dict(zip(("vx", "vy", "wz"), np.subtract(modulator.add(9, BASE), BASE), strict=True))
+    noise = dict(zip(axes, modulator.perturbation(9), strict=True))
+    assert added == pytest.approx({axis: 0.1 * noise.get(axis, 0.0) for axis in ("vx", "vy", "wz")})
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+def test_a_message_is_asked_for_the_slot_in_which_it_begins(schedule):
+    asked = []
+
+    class Asked(Counting):
+        def symbols(self, slot):
+            asked.append(slot)
+            return super().symbols(slot)
+
+    modulator = Modulator(small_codebook(schedule=schedule, first_slot=100), "b", Asked())
+    assert asked[0] == 100
+    played(modulator, range(130))
+    asked.clear()
+    modulator.queue(Asked())
+    assert asked == [102]
+
+
+def test_between_windows_of_a_queued_message_the_loop_may_run():
+    with patch("mtm_onboard.runtime.modulator.time.sleep") as sleep:
+        modulator = Modulator(small_codebook(), "b", (3, 0, 2))
+        assert sleep.call_args_list == []
+        modulator.queue((1, 1, 3))
+    assert [call.args for call in sleep.call_args_list] == [(0.001,)] * 3

@@ -1,4 +1,5 @@
 import os
+import sys
 import threading
 import tomllib
 from pathlib import Path
@@ -40,11 +41,67 @@ class Libc:
         return 0
 
 
-def test_what_is_asked_for_is_in_force_in_the_block_and_taken_back_after_it(system):
+def test_what_is_asked_for_is_in_force_within_the_block(system):
     with realtime(RealtimeSettings(priority=40, lock_memory=True, cpu=1), pytest.fail):
         assert system == ["locked", {1}, (os.SCHED_FIFO, 40)]
         system.clear()
     assert system == [(os.SCHED_OTHER, 0), {0, 1, 2}, "unlocked"]
+
+
+def test_every_thread_of_a_run_has_its_place_below_the_loop():
+    placed, ended = threading.Barrier(3), threading.Event()
+
+    def wait() -> None:
+        placed.wait(10.0)
+        ended.wait(10.0)
+
+    heartbeat, other = threading.Thread(target=wait), threading.Thread(target=wait)
+    heartbeat.start()
+    other.start()
+    placed.wait(10.0)
+    switches_s, warnings = sys.getswitchinterval(), []
+    try:
+        with realtime(RealtimeSettings(priority=10), warnings.append) as place_threads:
+            if warnings:
+                pytest.skip("this system grants no real-time priority")
+            place_threads(heartbeat)
+            places = [place(thread) for thread in (threading.main_thread(), heartbeat, other)]
+            assert places == [(os.SCHED_FIFO, 10), (os.SCHED_FIFO, 9), (os.SCHED_FIFO, 8)]
+            assert sys.getswitchinterval() < switches_s
+        assert {place(thread) for thread in (threading.main_thread(), heartbeat, other)} == {(os.SCHED_OTHER, 0)}
+        assert sys.getswitchinterval() == switches_s
+    finally:
+        ended.set()
+        heartbeat.join()
+        other.join()
+
+
+def place(thread: threading.Thread) -> tuple[int, int]:
+    return os.sched_getscheduler(thread.native_id), os.sched_getparam(thread.native_id).sched_priority
+
+
+def test_the_lowest_priority_is_everybody_s(system):
+    ended = threading.Event()
+    thread = threading.Thread(target=ended.wait)
+    thread.start()
+    with realtime(RealtimeSettings(priority=1), pytest.fail) as place_threads:
+        place_threads(thread)
+        assert system == [(os.SCHED_FIFO, 1)] * 2
+    ended.set()
+    thread.join()
+
+
+def test_no_thread_is_placed_where_nothing_is_asked_or_granted(system, monkeypatch):
+    with realtime(RealtimeSettings(cpu=1), pytest.fail) as place_threads:
+        place_threads(None)
+    assert system == [{1}, {0, 1, 2}]
+    monkeypatch.setattr(os, "sched_setscheduler", refused)
+    with realtime(RealtimeSettings(priority=40), lambda _: None) as place_threads:
+        place_threads(threading.current_thread())
+
+
+def refused(*_):
+    raise PermissionError(1, "Operation not permitted")
 
 
 def test_it_is_taken_back_when_the_block_fails(system):
@@ -59,11 +116,8 @@ def test_without_the_section_the_system_is_asked_for_nothing(system):
     assert system == []
 
 
-def test_what_the_system_refuses_is_one_warning_with_remedies_and_the_run_goes_on(system, monkeypatch):
-    def refuse(*_):
-        raise PermissionError(1, "Operation not permitted")
-
-    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+def test_what_the_system_refuses_is_one_warning(system, monkeypatch):
+    monkeypatch.setattr(os, "sched_setscheduler", refused)
     monkeypatch.setattr("ctypes.CDLL", lambda *_, **__: Libc(system, answer=-1))
     warnings = []
     with realtime(RealtimeSettings(priority=40, lock_memory=True, cpu=1), warnings.append):
@@ -127,7 +181,7 @@ def test_the_configuration_may_ask_for_it():
 
 
 def test_the_documented_section_is_one_that_can_be_asked_for():
-    text = (Path(__file__).parents[3] / "docs" / "robot.example.toml").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "examples/robots/none.toml").read_text(encoding="utf-8")
     _, *lines = text.partition("# [realtime]")[2].partition("\n\n")[0].splitlines()
     section = "\n".join(line.removeprefix("# ") for line in lines)
     assert config_from_table(table(**tomllib.loads(section))).realtime == RealtimeSettings(40, True, 3)

@@ -1,11 +1,13 @@
 import threading
 
-from mtm_onboard.links.none import NullTransport
+import pytest
+
+from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.clock import SystemClock
 from mtm_onboard.runtime.service import ServiceThread
 
 
-class Attended(NullTransport):
+class Attended(NullLink):
     """Tells when it was served three times, and fails after that when asked to."""
 
     service_period_s = 0.001
@@ -42,7 +44,7 @@ def test_a_failure_ends_the_service_and_is_kept():
 
 
 def test_whatever_ends_the_thread_is_an_error():
-    class Ending(NullTransport):
+    class Ending(NullLink):
         def service(self, now_s: float) -> None:
             raise SystemExit
 
@@ -55,7 +57,7 @@ def test_a_call_that_never_returns_does_not_hold_up_the_end(monkeypatch):
     monkeypatch.setattr("mtm_onboard.runtime.service._LONGEST_FAREWELL_S", 0.05)
     begun, released = threading.Event(), threading.Event()
 
-    class Wedged(NullTransport):
+    class Wedged(NullLink):
         def service(self, now_s: float) -> None:
             begun.set()
             released.wait(20.0)
@@ -67,3 +69,47 @@ def test_a_call_that_never_returns_does_not_hold_up_the_end(monkeypatch):
     released.set()
     thread.join(10.0)
     assert not thread.is_alive()
+
+
+class Script:
+    """A clock on which nothing takes time but the calls, and those as long as said, and the waits in between."""
+
+    def __init__(self, call_lengths_s) -> None:
+        self.now_s = 0.0
+        self.begun_s: list[float] = []
+        self._lengths_s = iter(call_lengths_s)
+        self._is_over = False
+
+    def now(self) -> float:
+        return self.now_s
+
+    def serve(self, now_s: float) -> None:
+        self.begun_s.append(now_s)
+        length_s = next(self._lengths_s, None)
+        self._is_over = length_s is None
+        self.now_s += length_s or 0.0
+
+    def is_set(self) -> bool:
+        return self._is_over
+
+    def wait(self, timeout_s: float) -> None:
+        assert timeout_s >= 0.0
+        self.now_s += timeout_s
+
+
+def calls_s(call_lengths_s) -> list[float]:
+    """When a link with a period of 10 ms is served whose calls last so long."""
+    script, link = Script(call_lengths_s), NullLink()
+    link.service = script.serve
+    service = ServiceThread(link, script)
+    vars(service)["_ending"] = script
+    service._run()
+    return script.begun_s
+
+
+def test_a_call_s_length_makes_none_of_the_next_ones_late():
+    assert calls_s([0.004, 0.0, 0.009, 0.001]) == pytest.approx([0.0, 0.01, 0.02, 0.03, 0.04])
+
+
+def test_periods_that_a_long_call_has_missed_are_skipped():
+    assert calls_s([0.0, 0.053, 0.0]) == pytest.approx([0.0, 0.01, 0.07, 0.08])

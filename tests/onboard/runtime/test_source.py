@@ -1,5 +1,4 @@
 import os
-import socket
 
 import pytest
 from hypothesis import given
@@ -8,21 +7,10 @@ from hypothesis import strategies as st
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.runtime.base_command import LONGEST_BYTES, StopRequest, parse, velocity_text
-from mtm_onboard.runtime.client import BaseCommandClient
-from mtm_onboard.runtime.source import NOTHING_YET, Command, HeldSource, StdinSource, UdpSource
+from mtm_onboard.runtime.source import NOTHING_YET, Command, HeldSource, StdinSource
 
 FIRST, SECOND = BodyVelocity(0.3, 0.0, -0.5), BodyVelocity(-0.1, 0.2, 0.0)
 finite = st.floats(allow_nan=False, allow_infinity=False)
-
-
-@pytest.fixture
-def udp():
-    source = UdpSource(0)
-    client = BaseCommandClient(source.port)
-    source.poll(0.0)
-    yield source, client
-    client.close()
-    source.close()
 
 
 @pytest.fixture
@@ -33,11 +21,6 @@ def piped():
     with open(writer, "wb", buffering=0) as end:
         yield source, end
     os.close(reader)
-
-
-def datagram(source: UdpSource, data: bytes) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.sendto(data, ("127.0.0.1", source.port))
 
 
 @given(st.builds(BodyVelocity, finite, finite, finite))
@@ -65,11 +48,6 @@ def test_what_is_no_command_is_refused(text):
         parse(text)
 
 
-def test_a_client_sends_no_velocity_that_is_not_finite(udp):
-    with pytest.raises(MtmError, match="finite"):
-        udp[1].send(BodyVelocity(float("nan"), 0.0, 0.0))
-
-
 def test_a_held_source_gives_what_was_set_last():
     source = HeldSource()
     assert source.poll(0.0) == NOTHING_YET
@@ -81,43 +59,7 @@ def test_a_held_source_gives_what_was_set_last():
     assert source.poll(3.0) == Command(FIRST, 3.0, True)
 
 
-def test_of_the_datagrams_that_came_the_newest_counts(udp):
-    source, client = udp
-    client.send(FIRST)
-    client.send(SECOND)
-    assert source.poll(0.02) == Command(SECOND, 0.02, False)
-    assert source.poll(0.04) == Command(SECOND, 0.02, False)
-
-
-def test_a_stop_among_other_datagrams_is_not_overtaken(udp):
-    source, client = udp
-    client.stop()
-    client.send(FIRST)
-    assert source.poll(0.02) == Command(FIRST, 0.02, True)
-
-
-def test_bad_datagrams_are_counted_and_leave_the_last_good_one(udp):
-    source, client = udp
-    client.send(FIRST)
-    for data in (b"nonsense", b"v nan 0 0", b"v 1 0 0" + b" " * 500, b""):
-        datagram(source, data)
-    assert source.poll(0.02) == Command(FIRST, 0.02, False)
-    assert source.refused == 4
-
-
-def test_what_came_while_nobody_looked_is_as_old_as_the_pause(udp):
-    source, client = udp
-    source.poll(0.02)
-    client.send(FIRST)
-    assert source.poll(1.5) == Command(FIRST, 0.02, False)
-
-
-def test_a_port_in_use_is_refused(udp):
-    with pytest.raises(MtmError, match="choose another port"):
-        UdpSource(udp[0].port)
-
-
-def test_of_the_lines_that_came_the_newest_counts_and_half_a_line_waits(piped):
+def test_the_newest_line_counts_and_half_a_line_waits(piped):
     source, end = piped
     end.write(b"v 0.3 0 -0.5\r\nv -0.1 0.")
     assert source.poll(0.02) == Command(FIRST, 0.02, False)

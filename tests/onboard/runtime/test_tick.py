@@ -7,20 +7,25 @@ import pytest
 
 from hil.fleet.clock import SimulatedClock
 from mtm_onboard.journal.journal import Journal, JournalHeader, read_journal
-from mtm_onboard.links.base import Transport
+from mtm_onboard.links.base import Link
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Channel, MtmError
+from mtm_onboard.protocol.journal_file import UNSENT
 from mtm_onboard.runtime.guard import NOISE, STALE, STOPPED, Guard, Limits, Staleness
-from mtm_onboard.runtime.loop import run_loop
+from mtm_onboard.runtime.loop import LoopStats, run_loop
 from mtm_onboard.runtime.modulator import Modulator
 from mtm_onboard.runtime.source import HeldSource
 from mtm_onboard.runtime.tick import Runtime
 from tests.onboard.schemes import small_codebook
 
 BASE = BodyVelocity(0.3, -0.1, 0.5)
+HEADER = JournalHeader(
+    fingerprint="0" * 16, key_id="fake-key", robot="robot0", channel="a", symbols=(2,), repeat=True, rate_hz=50.0,
+    start_s=0.0, start_unix_s=None,
+)  # fmt: skip
 
 
-class Listener(Transport):
+class Listener(Link):
     """Keeps what was sent; fails from the command number `failing_from` on."""
 
     def __init__(self, failing_from: float = math.inf, *, stop_fails: bool = False) -> None:
@@ -80,7 +85,7 @@ def test_without_a_modulator_the_base_commands_go_out_alone():
     assert drive(None, range(20)) == [BASE] * 20
 
 
-def test_a_controller_that_falls_silent_loses_the_noise_at_a_tenth_and_the_motion_at_a_quarter_second():
+def test_a_silent_controller_loses_noise_and_then_motion():
     sent = drive(message(), range(40), last_command_s=0.2)
     assert all(command != BASE for command in sent[:15])
     assert sent[15] == pytest.approx(BASE)  # 0.10 s after the last command
@@ -101,7 +106,43 @@ def test_a_link_that_fails_stops_the_robot_and_the_run():
         runtime.step(tick, tick / 50.0)
     with pytest.raises(MtmError, match="cable pulled.*told to stop"):
         runtime.step(3, 0.06)
-    assert (link.stops, runtime.transport_errors) == (1, 1)
+    assert (link.stops, runtime.link_losses) == (1, 1)
+
+
+def test_the_command_that_broke_the_link_is_journaled_unsent(tmp_path):
+    stats, clock = LoopStats(), SimulatedClock()
+    with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
+        runtime = Runtime(message(), plain_guard(), HeldSource(), Listener(failing_from=3), journal)
+        with pytest.raises(MtmError, match="told to stop"):
+            run_loop(clock, 50.0, runtime.step, start_s=0.0, stop=lambda: False, stats=stats)
+    flags = read_journal(journal.path).flags
+    assert [bool(flag & UNSENT) for flag in flags] == [False, False, False, True]
+    assert (stats.sent, stats.unsent) == (3, 1)
+
+
+def test_the_journal_s_lateness_is_the_loop_s_with_missed_ticks(tmp_path):
+    class Stalling(SimulatedClock):
+        def sleep_until(self, deadline_s: float) -> None:
+            super().sleep_until(deadline_s + (0.137 if abs(deadline_s - 0.1) < 1e-6 else 0.0))
+
+    clock = Stalling()
+    with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
+        runtime = Runtime(message(), plain_guard(), HeldSource(), Listener(), journal)
+        stats = run_loop(clock, 50.0, runtime.step, start_s=0.0, stop=lambda: clock.now() >= 0.5)
+    assert read_journal(journal.path).lateness_s.max() == pytest.approx(0.137, abs=1e-6)
+    assert stats.lateness.worst_s == pytest.approx(0.137)
+
+
+def test_a_link_that_doubts_is_told_of_in_the_journal_once(tmp_path):
+    link = Listener()
+    with Journal(tmp_path / "a.csv", HEADER, threaded=False) as journal:
+        runtime = Runtime(message(), plain_guard(), HeldSource(), link, journal)
+        for tick in range(30):
+            link.degraded = "no telemetry" if 10 <= tick < 20 else ""
+            runtime.step(tick, tick / 50.0)
+    told = [(event.tick, event.text) for event in read_journal(journal.path).events]
+    assert told == [(10, "the link is degraded: no telemetry"), (20, "the link is no longer degraded")]
+    assert runtime.link_degradations == 1
 
 
 def test_a_link_on_which_even_the_stop_fails_says_so():
@@ -117,7 +158,17 @@ def test_a_channel_of_joints_is_refused_before_anything_moves():
 
 
 def test_the_journal_tells_what_was_sent_and_why(tmp_path):
-    header = JournalHeader("0" * 16, "fake-key", "robot0", "a", (2, 0, 0, 0), True, 50.0, 0.0, None)
+    header = JournalHeader(
+        fingerprint="0" * 16,
+        key_id="fake-key",
+        robot="robot0",
+        channel="a",
+        symbols=(2, 0, 0, 0),
+        repeat=True,
+        rate_hz=50.0,
+        start_s=0.0,
+        start_unix_s=None,
+    )
     with Journal(tmp_path / "a.csv", header, threaded=False) as journal:
         sent = drive(message(), range(60), last_command_s=0.2, stop_s=0.8, journal=journal)
     record = read_journal(journal.path)
@@ -129,13 +180,13 @@ def test_the_journal_tells_what_was_sent_and_why(tmp_path):
     assert set(record.flags[40:]) == {STOPPED}
 
 
-def test_a_loop_on_simulated_time_that_loses_ticks_sends_the_same_commands_at_the_ticks_it_keeps():
+def test_a_loop_that_loses_ticks_sends_the_same_at_the_others():
     every = drive(message(), range(500))
     source, link, clock = HeldSource(), Listener(), SimulatedClock()
     runtime = Runtime(message(), plain_guard(), source, link)
     ticks = []
 
-    def step(tick: int, now_s: float) -> None:
+    def step(tick: int, now_s: float, _late_s: float) -> None:
         source.set(BASE, now_s)
         runtime.step(tick, now_s)
         ticks.append(tick)

@@ -29,7 +29,7 @@ def spelled(data):
     [(Framing("integer", 8), 4, 5), (Framing("integer", 9), 8, 3), (Framing("integer", 9), 2, 9)],
 )
 @given(seed=SEEDS)
-def test_without_a_code_the_list_is_exactly_the_likeliest_messages(framing, alphabet_size, count, seed):
+def test_without_a_code_the_list_is_the_likeliest_messages(framing, alphabet_size, count, seed):
     layout, words = all_codewords(framing, alphabet_size, count)
     ratios = np.random.default_rng(seed).normal(size=(count, alphabet_size))
     carrying = layout.code_symbols * layout.group

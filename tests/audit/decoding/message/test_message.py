@@ -96,7 +96,7 @@ def test_a_frame_of_another_key_or_epoch_is_not_authenticated(secret, epoch):
 
 
 @pytest.mark.parametrize(("check_bits", "most"), [(16, 16), (20, 256), (40, 1024)])
-def test_a_check_is_tried_so_seldom_that_chance_passes_one_frame_in_4096_at_most(check_bits, most):
+def test_chance_passes_one_frame_in_4096_at_most(check_bits, most):
     scheme = framed_scheme(Framing("integer", 16, check="tag", check_bits=check_bits))
     nothing = decode_message(np.zeros((48, 4)), scheme, OTHER_SECRET, [0, 1, 2])
     assert nothing.payload is None
@@ -104,7 +104,7 @@ def test_a_check_is_tried_so_seldom_that_chance_passes_one_frame_in_4096_at_most
     assert nothing.false_acceptance <= 2.0**-12
 
 
-def test_a_symbol_that_is_sure_and_wrong_does_not_outvote_the_others():
+def test_a_sure_and_wrong_symbol_does_not_outvote_the_others():
     symbols = encode_frame(4711, SCHEME, FAKE_SECRET)
     ratios = np.zeros((48, 4))
     ratios[np.arange(48), symbols] = 4.0
@@ -147,13 +147,13 @@ def posteriors_and_truth(framing, distance, frames=200):
 @pytest.mark.parametrize(
     ("framing", "distance"), [(Framing("integer", 24), 3.2), (Framing("integer", 10, code="reed-solomon"), 1.4)]
 )
-def test_where_all_can_be_summed_the_posterior_is_how_often_the_payload_is_right(framing, distance):
+def test_a_full_posterior_is_how_often_the_payload_is_right(framing, distance):
     posteriors, right = posteriors_and_truth(framing, distance)
     assert 0.3 < np.mean(right) < 0.9
     assert np.mean(right) == pytest.approx(np.mean(posteriors), abs=0.07)
 
 
-def test_the_posterior_of_a_coded_frame_promises_no_more_than_it_keeps():
+def test_the_posterior_of_a_coded_frame_keeps_its_promise():
     posteriors, right = posteriors_and_truth(Framing("integer", 16, code="reed-solomon"), 2.0)
     assert np.mean(posteriors) < np.mean(right)
     assert np.sum(posteriors > 0.9) >= 20

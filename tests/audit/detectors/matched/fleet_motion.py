@@ -40,7 +40,9 @@ def fleet_run(seed=1, message_ticks=150, seconds=None, *, alphabet=4, sends=True
     key = Key("fake", FAKE_SECRET, scheme)
     symbols = tuple(np.random.default_rng(seed).integers(0, alphabet, scheme.message_symbols).tolist())
     seconds = START_S + message_ticks / RATE_HZ + 0.6 if seconds is None else seconds
-    settings = RunSettings(key, symbols if sends else None, seconds, seed, wire="direct", start_s=START_S)
+    settings = RunSettings(
+        key=key, symbols=symbols if sends else None, seconds=seconds, seed=seed, wire="direct", start_s=START_S
+    )
     tracks = motion_capture_tracks(run_lockstep(settings), seeds_of(seed).slips[0] % 1000, MotionCapture())
     return FleetRun(key, symbols, tuple(tracks))
 

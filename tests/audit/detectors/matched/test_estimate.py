@@ -14,7 +14,7 @@ def posteriors(found):
 
 
 @pytest.mark.parametrize("seed", range(1, 5))
-def test_all_four_robots_are_read_in_three_seconds_without_knowing_the_plant(seed):
+def test_four_robots_are_read_in_three_seconds_of_unknown_plant(seed):
     run = fleet_run(seed)
     found = estimated(run)
     assert decisions(found) == run.symbols
@@ -55,7 +55,7 @@ def test_silent_robots_leave_the_symbols_open():
     assert sure <= 1
 
 
-def test_every_candidate_of_a_large_alphabet_has_a_finite_score_and_the_sent_one_the_best():
+def test_all_candidates_of_a_large_alphabet_have_finite_scores():
     run = fleet_run(4, alphabet=200)
     found = estimated(run)
     assert decisions(found) == run.symbols
@@ -65,7 +65,7 @@ def test_every_candidate_of_a_large_alphabet_has_a_finite_score_and_the_sent_one
         assert np.ptp(np.sort(ratios)[:100]) > 0.0
 
 
-def test_all_robots_with_the_same_symbols_are_read_each_by_itself():
+def test_robots_with_the_same_symbols_are_read_each_by_itself():
     run = fleet_run(5, combine="same")
     assert decisions(estimated(run)) == run.symbols * 4
 

@@ -56,7 +56,7 @@ def read(onsets_s=(TRUE.onset_s,) * 3):
     return MatchedDetector().read(KEY.codebook(), [], seen, None)
 
 
-def test_robots_whose_own_timing_is_open_are_read_by_that_of_their_fleet():
+def test_robots_of_open_timing_are_read_by_their_fleet_s():
     """Three of these four robots find no timing by themselves."""
     job = {"alphabet_size": JOBS[1].alphabet_size, "ticks": JOBS[1].ticks, "windows": JOBS[1].windows}
     read = read_under({"condition": "clock 1 % off, start unknown", **job}, 505)
@@ -83,7 +83,7 @@ def test_robots_that_share_a_timing_count_their_windows_alike():
     assert np.ptp(onsets_s) < 0.1
 
 
-def test_a_robot_that_is_seen_only_later_counts_from_a_message_that_it_shows():
+def test_a_robot_seen_later_counts_from_a_message_it_shows():
     late = tracks(seconds=30.0)
     shown = late[2].times_s >= 16.0
     late[2] = replace(
@@ -96,7 +96,7 @@ def test_a_robot_that_is_seen_only_later_counts_from_a_message_that_it_shows():
     assert -2.0 * WINDOW_S < last.onset_s - 16.0 < 0.71 * WINDOW_S
 
 
-def test_a_fleet_s_timings_are_the_same_whichever_codebook_is_called_the_key():
+def test_a_fleet_s_timings_do_not_depend_on_which_key_is_real():
     books = [KEY.codebook(), *decoy_codebooks(KEY, 2)]
     searched = [[Found(TRUE, 30.0), Found(WRONG, -7.0 - n), Found(Timing(0.3 * n, 51.0), -8.0)] for n in range(3)]
     plain = share_timings(books, fleet_of(tracks(), searched), None)

@@ -48,7 +48,7 @@ def test_irregular_frame_times_are_put_on_a_grid(seed):
     assert_shows_the_motion(motion, within=0.03)
 
 
-def test_many_samples_a_period_are_averaged_over_cells_that_suit_the_band():
+def test_many_samples_a_period_are_averaged_over_cells():
     motion = motion_of(np.arange(5000) / 500.0)
     assert motion.step_s == pytest.approx(0.04)
     assert_shows_the_motion(motion, within=1e-3)
@@ -78,6 +78,6 @@ def test_what_an_occlusion_touches_is_not_seen_and_the_rest_is():
     assert motion.velocities[:, inner] == pytest.approx(mean_velocities(motion)[:, inner], abs=0.02)
 
 
-def test_a_recording_of_a_moment_is_refused_with_the_length_it_takes():
+def test_a_recording_of_a_moment_is_refused_with_a_length():
     with pytest.raises(MtmError, match="lasts 0.30 s only; record at least 0.6 s"):
         motion_of(np.arange(16) / 50.0)

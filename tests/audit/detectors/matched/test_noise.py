@@ -31,7 +31,7 @@ def test_the_power_response_is_that_of_the_filter(taps):
     assert power_response(np.array(taps), frequencies) == pytest.approx(np.abs(response) ** 2, abs=1e-12)
 
 
-def test_an_autoregression_is_recovered_with_the_scale_of_each_axis():
+def test_an_autoregression_is_recovered_with_each_axis_s_scale():
     rng = np.random.default_rng(1)
     signals = [np.stack([autoregressive(rng, 4000), autoregressive(rng, 4000, scale=5.0)])]
     model = fit_noise(signals, [all_seen(4000)], order=4)
@@ -56,7 +56,7 @@ def test_outliers_are_doubted_and_do_not_bend_the_filter():
 
 
 @given(st.integers(0, 150), st.integers(1, 60))
-def test_samples_whose_history_touches_a_gap_weigh_nothing_and_all_others_do(first, length):
+def test_samples_with_a_gap_in_their_history_weigh_nothing(first, length):
     rng, seen = np.random.default_rng(3), all_seen(250)
     seen[first : first + length] = False
     observed = np.where(seen, autoregressive(rng, 250), 0.0)[None]

@@ -54,7 +54,7 @@ def test_before_the_window_and_long_after_it_nothing_sounds():
     assert np.abs(heard).max() < 1e-12
 
 
-def test_constant_commands_are_followed_in_full_after_the_delay_and_the_lag():
+def test_constant_commands_are_followed_after_delay_and_lag():
     family = plant_family(np.array([0.1]), np.array([0.05]))
     heard = tone_responses(family, np.array([0.0]), np.array([0.05, 0.099, 0.9]), LENGTH_S)[0, 0]
     assert heard.real == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)

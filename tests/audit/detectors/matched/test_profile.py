@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis.extra.numpy import arrays
 from hypothesis.strategies import floats
 
@@ -20,14 +20,16 @@ def certain_of(plant):
     return PlantProfile(np.eye(COUNT)[plant])
 
 
-@given(arrays(np.float64, COUNT, elements=floats(0.01, 1.0)))
+# One plant almost certain and the others all rounded alike is what loses most when weights are written short.
+@given(arrays(np.float64, COUNT, elements=floats(1e-9, 1.0)))
+@example(np.where(np.arange(COUNT) == 0, 1.0, 0.0101))
 def test_a_file_gives_back_what_was_written(tmp_path_factory, weights):
     path = tmp_path_factory.mktemp("profile") / "robot.profile"
     save_profile(PlantProfile(weights / weights.sum()), path)
-    assert load_profile(path).weights == pytest.approx(weights / weights.sum(), abs=1e-5)
+    assert load_profile(path).weights == pytest.approx(weights / weights.sum(), rel=1e-14, abs=0.0)
 
 
-def test_without_a_profile_every_time_of_returning_is_equally_likely_and_so_are_its_plants():
+def test_without_a_profile_times_of_returning_are_equally_likely():
     prior = np.exp(log_prior(None, COARSE))
     for return_s in (0.1, 0.3, np.inf):
         own = prior[COARSE.returns_s == return_s]
@@ -47,7 +49,7 @@ def test_a_profile_favours_what_is_near_and_rules_nothing_out(plant, family):
     assert abs(group_delays_s[best] - FINE.delays_s[plant] - FINE.lags_s[plant]) < 0.16
 
 
-def test_a_long_recording_shows_the_plant_and_a_wrong_profile_only_delays_it():
+def test_a_wrong_profile_only_delays_what_a_recording_shows():
     run = fleet_run(31, message_ticks=300)
     learnt = estimated(run)
     assert learnt.plants.sum() == pytest.approx(1.0)
@@ -58,7 +60,7 @@ def test_a_long_recording_shows_the_plant_and_a_wrong_profile_only_delays_it():
     assert misled.plants[-1] < 0.5
 
 
-def test_a_profile_makes_a_single_short_window_of_one_robot_surer():
+def test_a_profile_makes_a_single_short_window_surer():
     profile = PlantProfile(estimated(fleet_run(31, message_ticks=300)).plants)
     known, plain = [], []
     for seed in range(41, 51):
@@ -97,9 +99,9 @@ def faulty(edit):
         (lambda text: text.replace("lag_s", "lagging_s", 1), "plant 1 must have delay_s, lag_s, return_s, weight"),
         (lambda text: text.replace("weight = 0.0", "weight = -0.0", 1), "weight of plant 1 is -0.0"),
         (lambda text: text.replace("weight = 0.0", "weight = 0.9", 1), "the weights add up to 1.9"),
-        (lambda text: text.replace("weight = 0.031250", "weight = nan", 1), "the weight of plant 1 is nan"),
-        (lambda text: text.replace("weight = 0.031250", "weight = 'much'", 1), "plant 1 holds something that is not"),
-        (lambda text: text.replace("weight = 0.031250", "weight = true", 1), "plant 1 holds something that is not"),
+        (lambda text: text.replace("weight = 0.03125", "weight = nan", 1), "the weight of plant 1 is nan"),
+        (lambda text: text.replace("weight = 0.03125", "weight = 'much'", 1), "plant 1 holds something that is not"),
+        (lambda text: text.replace("weight = 0.03125", "weight = true", 1), "plant 1 holds something that is not"),
         (lambda text: text[:200], "is no profile"),
         (lambda text: "\x00", "is no profile"),
     ],

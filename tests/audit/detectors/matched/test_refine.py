@@ -44,7 +44,7 @@ def assert_drift_is_small(timings):
 
 
 @pytest.mark.parametrize("error", [-0.003, 0.003])
-def test_a_clock_three_in_a_thousand_off_is_put_right_to_a_fraction_of_a_tick(error):
+def test_a_clock_three_in_a_thousand_off_is_put_right(error):
     run = fleet_run(21, message_ticks=200, seconds=START_S + SECONDS)
     middle_s = START_S + SECONDS / 2
     rate_hz = RATE_HZ * (1.0 + error)

@@ -55,7 +55,7 @@ def test_both_ways_to_the_statistics_are_the_direct_sums(seed, axes, observed_ax
 
 
 @pytest.mark.parametrize("candidates", [1, 8], ids=["few", "many"])
-def test_statistics_give_the_gains_of_weighted_least_squares_on_whitened_data(candidates):
+def test_gains_are_those_of_weighted_least_squares(candidates):
     motion = motion_of(100)
     noise, window = noise_of(motion), window_of(motion)
     rows = response_rows(window, COARSE)
@@ -72,7 +72,7 @@ def test_statistics_give_the_gains_of_weighted_least_squares_on_whitened_data(ca
     assert gains == pytest.approx(expected)
 
 
-def test_the_planted_candidate_has_most_information_and_the_planted_gains():
+def test_the_planted_candidate_has_most_information():
     motion = motion_of(120)
     window = window_of(motion)
     rows = response_rows(window, COARSE)
@@ -105,7 +105,7 @@ def test_a_window_ends_with_its_tail_and_begins_with_its_start():
     assert window.last - window.first == len(window.since_start_s)
 
 
-def test_a_window_that_began_before_the_recording_keeps_its_own_time():
+def test_a_window_begun_before_the_recording_keeps_its_time():
     window = window_of(motion_of(200), number=0, onset_s=9.0)
     assert (window.first, window.since_start_s[0]) == (0, pytest.approx(1.0 + STEP_S / 2))
 

@@ -40,7 +40,7 @@ def rows_of(lines):
     return list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
 
-def test_the_file_begins_with_the_command_and_holds_three_detectors_a_job(written):
+def test_the_file_begins_with_the_command_and_three_detectors(written):
     assert written[0].startswith("# mtm-hil bench --quick --out ")
     rows = rows_of(written)
     assert len(rows) == 12
@@ -48,12 +48,12 @@ def test_the_file_begins_with_the_command_and_holds_three_detectors_a_job(writte
     assert any("Shannon capacity" in line for line in written)
 
 
-def test_matched_and_genie_read_what_the_paper_s_detector_does_not(written):
+def test_matched_and_genie_read_what_the_paper_s_does_not(written):
     paper, matched, genie = (int(row["symbols_correct"]) for row in rows_of(written)[:3])
     assert genie == matched == 12 > paper
 
 
-def test_a_second_run_takes_everything_from_the_cells_and_says_the_same(folder, written):
+def test_a_second_run_takes_everything_from_the_cells(folder, written):
     before = (folder / "cells.jsonl").read_bytes()
     again = run_bench(folder, "again").read_text().splitlines()
     assert again[1:] == written[1:]
@@ -61,7 +61,7 @@ def test_a_second_run_takes_everything_from_the_cells_and_says_the_same(folder, 
     assert (folder / "again.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(tmp_path, capsys):
+def test_an_undrawable_picture_is_refused_before_the_work(tmp_path, capsys):
     with pytest.raises(SystemExit) as ending:
         main(["bench", "--plot", str(tmp_path / "a.doc"), "--cells", str(tmp_path / "cells.jsonl")])
     assert ending.value.code == 1
@@ -69,7 +69,7 @@ def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(tmp_path, cap
     assert not (tmp_path / "cells.jsonl").exists()
 
 
-def test_auditors_see_the_motion_until_the_message_ends_and_the_paper_s_detector_a_quarter_more():
+def test_auditors_see_the_motion_until_the_message_ends():
     recording = record(Job(4, 100, 1, 0.1), PLANT, 1)
     assert recording.seen[0].edges_s[[0, -1]] == pytest.approx([0.0, ONSET_S + 2.0])
     assert recording.longer[0].edges_s[-1] >= ONSET_S + 2.5
@@ -78,13 +78,13 @@ def test_auditors_see_the_motion_until_the_message_ends_and_the_paper_s_detector
     )
 
 
-def test_a_rollout_of_one_window_sends_a_permutation_and_one_of_many_any_symbols():
+def test_a_rollout_of_one_window_sends_a_permutation():
     assert sorted(record(Job(4, 50, 1, 0.1), PLANT, 2).symbols[:, 0]) == [0, 1, 2, 3]
     assert record(Job(16, 50, 3, 0.1), PLANT, 2).symbols.shape == (4, 3)
     assert record(Job(16, 50, 3, 0.1), PLANT, 2).symbols.max() > 3
 
 
-def test_no_condition_is_measured_twice_and_no_seed_was_developed_on():
+def test_no_condition_comes_twice_and_no_seed_was_developed_on():
     jobs = [condition.job for condition in conditions(200)]
     assert len(set(jobs)) == len(jobs)
     assert FIRST_SEED >= 10_000
@@ -95,7 +95,7 @@ def row(detector, ticks, messages, sigma=0.1):
     return Row(Job(4, ticks, 1, sigma), detector, 200, Proportion(800, 800), Proportion(messages, 200))
 
 
-def test_the_shortest_window_is_the_first_with_99_percent_whole_messages():
+def test_the_shortest_window_is_the_first_of_99_percent_whole():
     rows = [row(MATCHED, 50, 150), row(MATCHED, 100, 198), row(MATCHED, 150, 200), row(COHERENCY, 400, 199)]
     assert shortest_window(rows, MATCHED, 99.0) == 100
     assert shortest_window(rows, GENIE, 99.0) is None
@@ -118,7 +118,7 @@ def test_a_level_is_crossed_between_the_sigmas_on_either_side():
 
 
 @given(st.lists(st.floats(0.0, 100.0), min_size=1, max_size=12))
-def test_an_isotonic_sequence_rises_keeps_the_mean_and_leaves_a_rising_one_alone(values):
+def test_an_isotonic_sequence_rises_and_keeps_the_mean(values):
     found = isotonic(np.array(values))
     assert np.all(np.diff(found) >= -1e-9)
     assert found.mean() == pytest.approx(np.mean(values), abs=1e-9)

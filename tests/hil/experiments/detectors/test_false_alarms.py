@@ -23,7 +23,7 @@ def test_a_rollout_without_the_key_in_it_is_not_decoded(arm):
     assert np.all((summary.p_values > 0.0) & (summary.p_values <= 1.0))
 
 
-def test_a_fleet_in_nameless_tracks_is_decoded_at_once_and_searched(monkeypatch):
+def test_a_fleet_in_nameless_tracks_is_decoded_and_searched(monkeypatch):
     seen = []
     decode = false_alarms.decode_tracks
     monkeypatch.setattr(false_alarms, "decode_tracks", lambda *asked: seen.append(decode(*asked)) or seen[-1])

@@ -20,7 +20,7 @@ def rows(tmp_path_factory):
         return measure(calibrated_parameters(), 3, store, QUIET, conditions=conditions, workers=1)
 
 
-def test_with_the_key_nearly_all_symbols_come_through_and_without_key_or_message_about_a_quarter(rows):
+def test_with_the_key_nearly_all_symbols_come_through(rows):
     sent, wrong, silent = rows
     assert (sent.symbols.trials, wrong.symbols.trials, silent.symbols.trials) == (12, 120, 12)
     assert sent.symbols.successes >= 10
@@ -35,12 +35,12 @@ def test_a_message_counts_when_all_four_symbols_do(rows):
     assert rows[1].messages is rows[2].messages is None
 
 
-def test_a_rollout_repeats_under_its_seed_and_differs_under_another():
+def test_a_rollout_repeats_under_its_seed_alone():
     parameters = rollout_parameters(SENT, 200, calibrated_parameters())
     assert decode_rollout(parameters, 5) == decode_rollout(parameters, 5) != decode_rollout(parameters, 6)
 
 
-def test_the_file_begins_with_the_command_and_agrees_with_the_rows(rows, tmp_path):
+def test_the_file_begins_with_the_command_and_fits_the_rows(rows, tmp_path):
     write_csv(tmp_path / "a.csv", rows, "mtm-hil paper robomaster -n 3", ("a plant",))
     first, _, second, *lines = (tmp_path / "a.csv").read_text().splitlines()
     assert (first, second) == ("# mtm-hil paper robomaster -n 3", "# a plant")
@@ -51,7 +51,7 @@ def test_the_file_begins_with_the_command_and_agrees_with_the_rows(rows, tmp_pat
     assert float(read[0]["symbol_percent_low"]) == pytest.approx(rows[0].symbols.interval_percent[0], abs=0.01)
 
 
-def test_the_table_fits_eighty_columns_and_shows_the_paper_s_figures(rows):
+def test_the_table_fits_80_columns_and_shows_the_paper_s_figures(rows):
     console = Console(file=io.StringIO(), width=80)
     console.print(rich_table(rows))
     text = console.file.getvalue()

@@ -15,7 +15,7 @@ def test_there_is_a_tick_for_each_period_and_none_is_disturbed(run):
     assert [(one.missed, one.disturbed, one.faults) for one in run] == [(0, 0, 0), (0, 0, 0)]
 
 
-def test_the_message_is_read_across_midnight_and_in_the_last_minute(run):
+def test_the_message_is_read_across_midnight_and_at_the_end(run):
     assert [one.symbols_right for one in run] == [len(SYMBOLS)] * 2
     assert all(one.p_value < 0.01 for one in run)
 

@@ -11,7 +11,7 @@ from hil.cli import main
 def _c_compiler():
     if not any(shutil.which(name) for name in ("cc", "gcc", "clang")):
         pytest.skip("no C compiler here; install gcc")
-    pytest.importorskip("cffi", reason="the C shim is called through cffi; install mtm[dev]")
+    pytest.importorskip("cffi", reason="the C shim is called through cffi; run make setup")
 
 
 def test_the_shim_s_messages_come_through_as_python_s_do(tmp_path, capsys):

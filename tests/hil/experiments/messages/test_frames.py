@@ -48,7 +48,7 @@ def test_a_cell_gives_the_same_again():
     assert one_cell(NOISE, bits=16, distance=1.6) == one_cell(NOISE, bits=16, distance=1.6)
 
 
-def test_every_check_gets_the_frames_asked_and_no_cell_comes_twice():
+def test_every_check_gets_its_frames_and_no_cell_comes_twice():
     plans = frame_cells(10_000, 7)
     cells = [cell for plan in plans for cell in plan]
     assert len({cell.name for cell in cells}) == len(cells)

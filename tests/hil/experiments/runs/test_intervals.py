@@ -7,7 +7,7 @@ from hil.experiments.runs.intervals import clopper_pearson
 @pytest.mark.parametrize(
     ("successes", "trials", "percent"), [(20, 20, (83.2, 100.0)), (80, 80, (95.5, 100.0)), (0, 20, (0.0, 16.8))]
 )
-def test_the_intervals_of_perfect_runs_are_those_that_the_paper_gives(successes, trials, percent):
+def test_the_intervals_of_perfect_runs_are_the_paper_s(successes, trials, percent):
     low, high = clopper_pearson(successes, trials)
     assert (100 * low, 100 * high) == pytest.approx(percent, abs=0.05)
 

@@ -37,7 +37,7 @@ def cells(count):
     return [Cell("squares", {"x": number}, number % 3) for number in range(count)]
 
 
-def test_results_come_in_the_order_of_the_cells_from_other_processes(module, tmp_path):
+def test_results_of_other_processes_come_in_the_cells_order(module, tmp_path):
     with CellStore(tmp_path / "cells.jsonl") as store:
         results = run_sweep(module.square, cells(6), store, QUIET, workers=2)
     assert [result["square"] for result in results] == [number**2 + number % 3 for number in range(6)]

@@ -12,7 +12,7 @@ def test_long_windows_of_the_lander_are_read_right():
     assert right == {"side": 2, "main": 2, "side+main": 2, WHOLE: 1}
 
 
-def test_the_arm_s_inner_joint_is_read_while_the_outer_one_says_something_else():
+def test_the_inner_joint_is_read_while_the_outer_one_speaks():
     right = read_world(world_parameters("reacher", world_scheme("reacher", 4, 150, 2), "matched"), 1)
     assert right["inner"] == 2
 

@@ -38,7 +38,7 @@ def unequal_scheme(**changes):
     return replace(fleet_scheme(200), channels=own, **changes)
 
 
-def test_a_sweep_measures_every_channel_alone_and_every_set_of_them_pooled(sweep, tmp_path):
+def test_a_sweep_measures_channels_alone_and_sets_pooled(sweep, tmp_path):
     code, out, _ = sweep(*ONE_CELL)
     table = read_table(tmp_path / "table.csv")
     assert (code, len(table.points), len(table.channels)) == (0, 15, 15)
@@ -54,7 +54,7 @@ def test_a_sweep_measures_every_channel_alone_and_every_set_of_them_pooled(sweep
     )
 
 
-def test_an_interrupted_sweep_goes_on_from_its_cells_and_says_the_same(sweep, tmp_path):
+def test_an_interrupted_sweep_goes_on_and_says_the_same(sweep, tmp_path):
     sweep(*ONE_CELL)
     cells = tmp_path / "cells.jsonl"
     lines = cells.read_bytes().splitlines(keepends=True)
@@ -71,7 +71,7 @@ def test_held_out_seeds_are_other_rollouts(sweep, tmp_path):
     assert [json.loads(json.loads(line)["cell"])[2] for line in lines] == [700_000, 700_001, 800_000, 800_001]
 
 
-def test_a_scheme_file_has_its_own_windows_and_whole_messages_measured(sweep, tmp_path):
+def test_a_scheme_file_has_its_own_windows_measured(sweep, tmp_path):
     save_scheme(unequal_scheme(), tmp_path / "plan.toml")
     code, out, _ = sweep("--scheme", tmp_path / "plan.toml", "-n", "2")
     points = read_table(tmp_path / "table.csv").points
@@ -107,7 +107,7 @@ def test_the_paper_s_detector_can_measure_as_well():
     assert sum(int(result[f"robot{number}"]) for number in range(4)) >= 3
 
 
-def test_a_grid_has_one_scheme_for_each_alphabet_and_window_with_windows_in_a_row():
+def test_a_grid_has_one_scheme_for_each_alphabet_and_window():
     schemes = grid("robomaster", [4, 16], [100, 50], 3)
     assert [(scheme.alphabet_size, scheme.message_ticks) for scheme in schemes] == [
         (4, 300), (4, 150), (16, 300), (16, 150),

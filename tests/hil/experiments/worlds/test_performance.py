@@ -20,7 +20,7 @@ def test_a_steady_command_has_energy_and_no_jerk():
     assert found["commands at the limit"] == 0.0
 
 
-def test_a_force_s_jerk_is_its_slope_and_a_velocity_s_its_curvature():
+def test_a_force_s_jerk_is_slope_and_a_velocity_s_curvature():
     times_s = np.arange(100)[:, None] / 10
     assert measures("football", control(2 * times_s, 2 * times_s), 10.0)["jerk, root mean square"] == pytest.approx(2.0)
     bent = 3 * times_s**2

@@ -29,7 +29,7 @@ def test_messages_in_a_row_are_read_in_their_order(detector):
 
 
 @pytest.mark.parametrize("detector", [COHERENCY, MATCHED])
-def test_shots_with_a_cut_between_them_are_read_by_their_own_clocks(detector):
+def test_shots_with_a_cut_between_are_read_by_their_own_clocks(detector):
     codebook = Codebook(SECRET, same_scheme("discovery", 8, 60, 1))
     noise = keyed_noise(codebook, [(2,), (6,), (1,)], ("agent.vx", "agent.vy"))
     shots = [moved("agent", noise[first : first + 60], 10.0, 50.0 + first, first) for first in (0, 60, 120)]
@@ -38,7 +38,7 @@ def test_shots_with_a_cut_between_them_are_read_by_their_own_clocks(detector):
 
 
 @pytest.mark.parametrize("detector", [COHERENCY, MATCHED])
-def test_axes_of_one_body_that_say_different_things_are_read_apart(detector):
+def test_axes_that_say_different_things_are_read_apart(detector):
     codebook = Codebook(SECRET, split_scheme("lunar-lander", 4, 576, (2, 3)))
     noise = keyed_noise(codebook, [(1, 3, 0, 2, 2)], ("lander.vx", "lander.vy"))
     side, main = read_windows(codebook, [moved("lander", noise, 50.0)], 1, detector)

@@ -25,7 +25,7 @@ def quick_table(tmp_path_factory):
     return table_of(out), cells
 
 
-def test_a_quick_look_at_the_lander_reads_the_headline_s_messages(quick_table):
+def test_a_quick_look_at_the_lander_reads_the_headline(quick_table):
     table, _ = quick_table
     for detector in ("coherency", "matched"):
         (row,) = [
@@ -70,7 +70,7 @@ def test_a_renderer_that_does_not_exist_is_refused(capsys):
     assert "'crayon' is not one of" in capsys.readouterr().err
 
 
-def test_all_rollouts_of_the_headline_and_a_part_of_the_others_are_asked_for():
+def test_all_rollouts_of_the_headline_are_asked_for():
     conditions = conditions_of("reacher", Effort(50, 50, 5, 0))
     counts = {condition.point: condition.rollouts for condition in conditions if condition.arm != NO_MESSAGE}
     assert counts[headline_point("reacher", 60)] == 50
@@ -81,12 +81,34 @@ def test_all_rollouts_of_the_headline_and_a_part_of_the_others_are_asked_for():
 def test_a_cell_is_held_against_the_paper_s_by_their_intervals(right, verdict):
     cell = next(cell for cell in paper_entries("discovery") if cell.percent == 79.0)
     goals = Proportion(right, 400)
-    assert against_the_paper(Row("message", cell.point, "coherency", 50, goals, goals, 0.1, cell)) == verdict
+    assert (
+        against_the_paper(
+            Row(
+                arm="message",
+                point=cell.point,
+                detector="coherency",
+                rollouts=50,
+                goals=goals,
+                symbols=goals,
+                margin=0.1,
+                paper=cell,
+            )
+        )
+        == verdict
+    )
 
 
 def row_of(ticks, detector, right):
     goals = Proportion(right, 400)
-    return Row("message", headline_point("reacher", ticks), detector, 50, goals, goals, 0.1)
+    return Row(
+        arm="message",
+        point=headline_point("reacher", ticks),
+        detector=detector,
+        rollouts=50,
+        goals=goals,
+        symbols=goals,
+        margin=0.1,
+    )
 
 
 def test_the_shortest_message_is_the_last_of_those_read_as_well():
@@ -102,5 +124,5 @@ def test_a_longer_message_read_badly_ends_the_search():
     assert shortest_ticks(rows, "matched") == 240
 
 
-def test_a_detector_that_never_reads_as_well_has_no_shortest_message():
+def test_a_detector_that_never_reads_as_well_has_no_shortest():
     assert shortest_ticks([row_of(240, "coherency", 399), row_of(240, "matched", 300)], "matched") is None

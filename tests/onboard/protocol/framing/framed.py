@@ -14,7 +14,16 @@ def framed_scheme(framing, alphabet_size=4, counts=(12, 12, 12, 12), **changes):
     """Channels of `counts` symbols, each on a body of its own."""
     channels = tuple(Channel(f"c{n}", f"b{n}", ("vx",), count, 0.1) for n, count in enumerate(counts))
     ticks = 10_080
-    return Scheme("t", 50.0, (2.0, 20.0), alphabet_size, ticks, channels, framing=framing, **changes)
+    return Scheme(
+        name="t",
+        rate_hz=50.0,
+        band_hz=(2.0, 20.0),
+        alphabet_size=alphabet_size,
+        message_ticks=ticks,
+        channels=channels,
+        framing=framing,
+        **changes,
+    )
 
 
 @st.composite
@@ -25,9 +34,14 @@ def framings(draw, checks=("none", "crc", "tag"), codes=("none", "reed-solomon")
     check = draw(st.sampled_from(checks))
     widths = {"none": st.just(0), "crc": st.sampled_from(sorted(CRC_POLYNOMIALS)), "tag": st.integers(16, 64)}
     return Framing(
-        payload, bits, draw(st.integers(0, 16)), check, draw(widths[check]), draw(st.sampled_from(codes)),
-        draw(st.booleans()),
-    )  # fmt: skip
+        payload,
+        bits,
+        number_bits=draw(st.integers(0, 16)),
+        check=check,
+        check_bits=draw(widths[check]),
+        code=draw(st.sampled_from(codes)),
+        interleave=draw(st.booleans()),
+    )
 
 
 def payloads(framing):
@@ -57,5 +71,11 @@ def schemes(draw, **limits):
 def plain_row(framing, alphabet_size, count):
     """One channel of `count` symbols, in windows long enough for two tones."""
     return Scheme(
-        "t", 50.0, (2.0, 20.0), alphabet_size, 20 * count, (Channel("c", "b", ("vx",), count, 0.1),), framing=framing
+        name="t",
+        rate_hz=50.0,
+        band_hz=(2.0, 20.0),
+        alphabet_size=alphabet_size,
+        message_ticks=20 * count,
+        channels=(Channel("c", "b", ("vx",), count, 0.1),),
+        framing=framing,
     )

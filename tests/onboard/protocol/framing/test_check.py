@@ -1,3 +1,5 @@
+import binascii
+
 import pytest
 
 from mtm_onboard.protocol.framing.check import check_value, crc
@@ -36,3 +38,17 @@ def test_the_crc_covers_the_epoch_and_needs_no_key():
     values = {check_value(0, 5, framing, FAKE_SECRET, epoch) for epoch in range(100)}
     assert len(values) == 100
     assert check_value(0, 5, framing, bytes(32), 0) == check_value(0, 5, framing, FAKE_SECRET, 0)
+
+
+@pytest.mark.parametrize(
+    ("epoch", "number", "body"), [(0, 0, 0), (1, 2, 3), (20_000, 0xAB, 0x1234), (2**63, 255, 65_535)]
+)
+def test_a_crc_runs_over_epoch_number_and_body(epoch, number, body):
+    framing = Framing("integer", 16, number_bits=8, check="crc", check_bits=16)
+    content = epoch.to_bytes(8, "big") + bytes([number]) + body.to_bytes(2, "big")
+    # The standard library's CRC of the same polynomial.
+    assert check_value(number, body, framing, FAKE_SECRET, epoch) == binascii.crc_hqx(content, 0xFFFF)
+
+
+def test_a_frame_without_a_check_has_none():
+    assert check_value(0, 5, Framing("integer", 8), FAKE_SECRET, 7) == 0

@@ -42,7 +42,7 @@ def read_or_none(symbols, scheme, secret=FAKE_SECRET, epoch=0):
 
 
 @given(schemes(checks=CHECKED), st.data())
-def test_a_changed_symbol_of_a_checked_frame_is_corrected_or_refused(scheme, data):
+def test_a_changed_symbol_is_corrected_or_refused(scheme, data):
     payload = data.draw(payloads(scheme.framing))
     symbols = list(encode_frame(payload, scheme, FAKE_SECRET))
     place = data.draw(st.integers(0, len(symbols) - 1))
@@ -67,7 +67,7 @@ def test_half_the_parity_may_be_wrong_and_all_of_it_missing(scheme, data):
     assert decode_frame(missing, scheme, FAKE_SECRET) == Frame(payload, 0)
 
 
-def test_a_tagged_frame_is_read_under_its_own_key_and_epoch_alone():
+def test_a_tagged_frame_needs_its_own_key_and_epoch():
     scheme = framed_scheme(CODED)
     symbols = encode_frame(4711, scheme, FAKE_SECRET, number=300, epoch=7)
     assert decode_frame(symbols, scheme, FAKE_SECRET, epoch=7) == Frame(4711, 44)
@@ -76,7 +76,7 @@ def test_a_tagged_frame_is_read_under_its_own_key_and_epoch_alone():
             decode_frame(symbols, scheme, secret, epoch=epoch)
 
 
-def test_the_frame_is_number_payload_tag_and_filler_most_significant_bit_first():
+def test_the_frame_is_number_payload_tag_and_filler():
     scheme = plain_row(TAGGED, 16, 14)
     tag = stream(FAKE_SECRET, "tag", (9, 0xAB, 0x1234), 3)
     symbols = encode_frame(0x1234, scheme, FAKE_SECRET, number=0x5AB, epoch=9)
@@ -92,7 +92,7 @@ def test_the_examples_of_the_documentation_hold():
     assert "".join(f"{symbol:x}" for symbol in symbols) == "9a30ea4961800"
 
 
-def test_short_bytes_are_padded_and_their_length_less_one_comes_first():
+def test_short_bytes_are_padded_after_their_length():
     scheme = plain_row(Framing("bytes", 4 * 8), 4, 17)
     assert encode_frame(b"\xe4", scheme, FAKE_SECRET) == (0, 3, 2, 1, 0, *[0] * 12)
     assert encode_frame(b"\x00\x00\x00\x00", scheme, FAKE_SECRET)[0] == 3
@@ -145,7 +145,7 @@ def test_a_scheme_without_framing_sends_plain_numbers():
         (Framing("text", 16), "\ud800", "cannot be printed"),
     ],
 )
-def test_a_payload_that_cannot_be_sent_is_refused_in_one_sentence(framing, payload, words):
+def test_a_payload_that_cannot_be_sent_is_refused(framing, payload, words):
     with pytest.raises(MtmError, match=words):
         encode_frame(payload, framed_scheme(framing), FAKE_SECRET)
 
@@ -167,9 +167,16 @@ def test_bits_that_spell_no_text_are_refused(content):
         decode_frame([int(bit) for bit in bits], plain_row(Framing("text", 24), 2, 26), FAKE_SECRET)
 
 
-def test_a_robot_sends_a_code_without_the_package_that_corrects_it(monkeypatch):
+def test_a_robot_needs_no_package_that_corrects(monkeypatch):
     frame = encode_frame(1, framed_scheme(CODED), FAKE_SECRET)
     monkeypatch.setitem(sys.modules, "reedsolo", None)
     assert encode_frame(1, framed_scheme(CODED), FAKE_SECRET) == frame
-    with pytest.raises(MtmError, match=r"install it with: pip install 'mtm\[rs\]'"):
+    with pytest.raises(MtmError, match=r"install it with: pip install 'messages-through-motion\[audit\]'"):
         decode_frame(frame, framed_scheme(CODED), FAKE_SECRET)
+
+
+def test_epoch_and_number_are_zero_unless_they_are_given():
+    scheme = framed_scheme(CODED)
+    symbols = encode_frame(7, scheme, FAKE_SECRET)
+    assert symbols == encode_frame(7, scheme, FAKE_SECRET, number=0, epoch=0)
+    assert decode_frame(symbols, scheme, FAKE_SECRET) == Frame(7, 0)

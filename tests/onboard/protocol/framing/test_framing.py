@@ -23,7 +23,7 @@ def test_the_field_is_as_small_as_holds_the_codeword():
 
 
 @given(framings(), st.integers(1, 16), st.integers(1, 700))
-def test_a_frame_that_does_not_fit_says_how_many_symbols_would_hold_it(framing, symbol_bits, count):
+def test_a_frame_that_does_not_fit_says_what_would(framing, symbol_bits, count):
     try:
         layout = layout_of(framing, 2**symbol_bits, count)
     except MtmError as error:
@@ -113,7 +113,7 @@ def test_a_key_file_with_a_spoilt_framing_is_refused(tmp_path, old, new, words):
         load_key(path)
 
 
-def test_a_framing_changes_the_fingerprint_and_its_absence_does_not():
+def test_only_a_framing_changes_the_fingerprint():
     plain, framed = framed_scheme(None), framed_scheme(FRAMING)
     assert plain.fingerprint == "46aecdf11484c066"
     assert len({plain.fingerprint, framed.fingerprint, framed_scheme(replace(FRAMING, check_bits=16)).fingerprint}) == 3

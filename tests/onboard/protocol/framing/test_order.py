@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mtm_onboard.protocol.framing import Framing, frame_order
+from mtm_onboard.protocol.framing.framing import layout_of
 from tests.onboard.protocol.framing.framed import framed_scheme
 
 FRAMING = Framing("integer", 8, code="reed-solomon", interleave=True)
@@ -54,3 +55,35 @@ def test_what_one_repetition_hides_the_next_ones_show(hidden):
 def test_channels_that_say_the_same_share_one_order():
     order = frame_order(interleaved(counts=(12, 12), combine="same"), 0)
     np.testing.assert_array_equal(order, np.arange(12))
+
+
+# By hand from docs/framing.md: GF(16) over symbols of two bits, so that runs are pairs.
+PAIRS = Framing("integer", 4, code="reed-solomon", interleave=True)
+
+
+@pytest.mark.parametrize(
+    ("counts", "slot", "order"),
+    [
+        # n = 6: round(0.618 n) = 4 has a divisor in common with 6, so that the step is 5 code symbols.
+        ((6, 6), 0, [0, 1, 4, 5, 8, 9, 2, 3, 6, 7, 10, 11]),
+        ((6, 6), 1, [10, 11, 2, 3, 6, 7, 0, 1, 4, 5, 8, 9]),
+        ((6, 6), 7, [10, 11, 2, 3, 6, 7, 0, 1, 4, 5, 8, 9]),
+        ((6, 6), 2, [8, 9, 0, 1, 4, 5, 10, 11, 2, 3, 6, 7]),
+        # Windows of three lengths; the run that is too short for a pair is filler.
+        ((8, 4, 1), 0, [0, 1, 4, 5, 6, 7, 10, 11, 2, 3, 8, 9, 12]),
+        ((8, 4, 1), 1, [10, 11, 2, 3, 4, 5, 8, 9, 0, 1, 6, 7, 12]),
+        # n = 3: the step is 2.
+        ((6,), 0, [0, 1, 2, 3, 4, 5]),
+        ((6,), 1, [4, 5, 0, 1, 2, 3]),
+    ],
+)
+def test_the_order_is_the_documented_one(counts, slot, order):
+    assert frame_order(interleaved(counts, framing=PAIRS), slot).tolist() == order
+
+
+# Codewords of 8, 10, 12, 13, 14, 16 and 20 code symbols: the next number from 0.618 n on that shares no divisor with n.
+@pytest.mark.parametrize(("symbols", "step"), [(16, 5), (20, 7), (24, 7), (40, 8), (28, 9), (48, 11), (60, 13)])
+def test_from_slot_to_slot_the_codeword_turns_by_0_618(symbols, step):
+    group = layout_of(PAIRS, 4, symbols).group
+    first, second = (int(frame_order(interleaved((symbols,), framing=PAIRS), slot)[0]) for slot in (0, 1))
+    assert (first, second) == (0, step * group)

@@ -12,6 +12,7 @@ from contextlib import suppress
 
 from mtm_onboard.links.base import LinkBusyError
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.installing import install_command
 
 _CONNECT_WITHIN_S = 3.0
 _DELIVER_WITHIN_S = 0.2
@@ -21,7 +22,7 @@ _READS_AT_ONCE = 16  # so that a babbling far end cannot hold its reader for eve
 _SEND_BUFFER_BYTES = 2048
 
 
-class ByteLink:
+class ByteStream:
     """The open `descriptor` of a stream, which it makes non-blocking; `release` closes it.
 
     A message that has left in part is finished before the next one, so that the far end never meets half a message
@@ -49,6 +50,9 @@ class ByteLink:
         before = self.sent_bytes
         try:
             self._flush(deadline_s)
+        except LinkBusyError as error:
+            error.has_begun = self.sent_bytes - before > owed
+            raise
         finally:
             if self.sent_bytes - before <= owed:
                 del self._unsent[owed - (self.sent_bytes - before) :]
@@ -104,21 +108,23 @@ class ByteLink:
                 )
 
 
-def serial_link(port: str, baudrate: int) -> ByteLink:
+def serial_stream(port: str, baudrate: int) -> ByteStream:
     """Open a serial line, 8 data bits, no parity, 1 stop bit; raises MtmError when it cannot be had."""
     try:
         import serial
     except ImportError:
-        raise MtmError("pyserial is not installed; install mtm[serial] to reach a robot over a serial line.") from None
+        raise MtmError(
+            f"a serial line needs pyserial, which is not installed; install it with: {install_command('serial')}"
+        ) from None
     try:
         # Exclusive: another program's commands on the same line would mix with ours.
         line = serial.Serial(port, baudrate, timeout=0, exclusive=True)
     except (OSError, ValueError) as error:
         raise MtmError(f"The serial line {port} cannot be opened ({error}); check the port and its owner.") from error
-    return ByteLink(line.fileno(), line.close)
+    return ByteStream(line.fileno(), line.close)
 
 
-def tcp_link(host: str, port: int) -> ByteLink:
+def tcp_stream(host: str, port: int) -> ByteStream:
     """Connect to `host`; raises MtmError when nobody answers there within a few seconds."""
     try:
         connection = socket.create_connection((host, port), _CONNECT_WITHIN_S)
@@ -128,7 +134,7 @@ def tcp_link(host: str, port: int) -> ByteLink:
         raise MtmError(
             f"The robot at {host} port {port} cannot be reached ({error}); check that it is on and in this network."
         ) from error
-    return ByteLink(connection.fileno(), lambda: _close_delivered(connection))
+    return ByteStream(connection.fileno(), lambda: _close_delivered(connection))
 
 
 def _close_delivered(connection: socket.socket) -> None:
