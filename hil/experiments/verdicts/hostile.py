@@ -42,7 +42,8 @@ def hostile_recording(kind: str, number: int, seed: int) -> Recording:
     symbols = 1 + number // 4 % 2
     names = [f"robot{row}" for row in range(robots)]
     channels = tuple(Channel(name, name, ("vx", "vy"), symbols, _SIGMA) for name in names)
-    scheme = Scheme("hostile", _RATE_HZ, _BAND_HZ, _ALPHABET, _TICKS, channels, power=power)
+    scheme = Scheme(name="hostile", rate_hz=_RATE_HZ, band_hz=_BAND_HZ, alphabet_size=_ALPHABET, message_ticks=_TICKS,
+                    channels=channels, power=power)  # fmt: skip
     known_s = float(draw.uniform(0.0, 1.0))
     return Recording(tuple(maker(scheme, draw)), scheme, known_s if number % 2 == 0 else None)
 

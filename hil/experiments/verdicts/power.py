@@ -79,7 +79,9 @@ def decode_job(parameters: Values, seed: int) -> dict[str, Scalar]:
     symbols = tuple(int(symbol) for symbol in draw.integers(0, _ALPHABET, ROBOTS))
     seconds = _START_S + condition.messages * scheme.message_ticks / scheme.rate_hz + _AFTER_S
     plant = slower_parameters() if condition.slower else calibrated_parameters()
-    settings = RunSettings(key, symbols, seconds, seed, wire="direct", start_s=_START_S, plant=plant)
+    settings = RunSettings(
+        key=key, symbols=symbols, seconds=seconds, seed=seed, wire="direct", start_s=_START_S, plant=plant
+    )
     tracks = motion_capture_tracks(run_lockstep(settings), seed, MotionCapture())
     asked = DecodeSettings(onset_s=_START_S if condition.onset_known else None)
     decodings = decode_at(tracks, key, asked)

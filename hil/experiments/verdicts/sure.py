@@ -146,7 +146,15 @@ def _fleet(draw: np.random.Generator) -> tuple[Key, _Job, list[Track], tuple[int
 
 def _scheme(channels: tuple[Channel, ...], ticks: int, draw: np.random.Generator) -> Scheme:
     power: Power = "ensemble" if draw.random() < 0.25 else "window"
-    return Scheme("sure", 50.0, (0.5, 5.0), int(draw.choice((4, 16, 64, 256))), ticks, channels, power=power)
+    return Scheme(
+        name="sure",
+        rate_hz=50.0,
+        band_hz=(0.5, 5.0),
+        alphabet_size=int(draw.choice((4, 16, 64, 256))),
+        message_ticks=ticks,
+        channels=channels,
+        power=power,
+    )
 
 
 def _job(scheme: Scheme, draw: np.random.Generator) -> _Job:
