@@ -79,7 +79,7 @@ def scored(scores):
     """A reading of windows that each have a position of their own, with these scores."""
     scores = np.array(scores, dtype=float)
     numbers = np.arange(len(scores))
-    return Reading(Timing(0.0, 50.0), scores, scores, numbers, numbers, numbers * 1.0, 0.0, 1)
+    return Reading(Timing(0.0, 50.0), scores, scores, numbers, numbers, numbers * 1.0, 0.0)
 
 
 # Null scores of position 0: mean 0.2, variance 0.01; of position 1: mean 0.3, variance 0.04; of both: 0.25 and 0.0275.
