@@ -200,6 +200,11 @@ def test_windows_divide_the_message(ticks, symbols, nearest):
             message_ticks=ticks, channel={"symbols": symbols})  # fmt: skip
 
 
+@pytest.mark.parametrize("ticks", [1, 2])
+def test_a_message_of_a_tick_is_one_window_that_is_too_short(ticks):
+    refused("fewer than two tones .* shortest window that works is 5 ticks", message_ticks=ticks)
+
+
 def test_channels_have_names_of_their_own_and_may_share_a_body():
     channels = (Channel("a", "x", ("vx",), 1, 0.1), Channel("b", "x", ("vy",), 1, 0.1))
     assert len(small_scheme(channels=channels).channels) == 2
