@@ -200,6 +200,11 @@ def test_windows_divide_the_message(ticks, symbols, nearest):
             message_ticks=ticks, channel={"symbols": symbols})  # fmt: skip
 
 
+@pytest.mark.parametrize("ticks", [1, 2])
+def test_a_message_of_a_tick_is_one_window_that_is_too_short(ticks):
+    refused("fewer than two tones .* shortest window that works is 5 ticks", message_ticks=ticks)
+
+
 def test_channels_have_names_of_their_own_and_may_share_a_body():
     channels = (Channel("a", "x", ("vx",), 1, 0.1), Channel("b", "x", ("vy",), 1, 0.1))
     assert len(small_scheme(channels=channels).channels) == 2
@@ -229,7 +234,7 @@ def test_a_framing_that_does_not_fit_is_refused_with_the_scheme():
         (50.0, (1.0, 1.001), 50_000),
         (5.0, (1.0, 2.4), 5),
         (10.0, (0.1, 4.9), 5),
-        (50.0, (1.0, 1.000_000_1), None),
+        (50.0, (1.0, 1.000_03), None),
     ],
 )
 def test_the_shortest_windows_of_some_bands(rate_hz, band_hz, shortest):
@@ -257,6 +262,15 @@ def test_bins_are_counted_as_the_definition_says(ticks, rate_hz, low, width):
     band_hz = (low * rate_hz, min(low + width, 0.499) * rate_hz)
     definition = [k for k in range(1, ticks) if k < ticks / 2 and band_hz[0] <= k * rate_hz / ticks <= band_hz[1]]
     assert count_bins(ticks, rate_hz, band_hz) == len(definition)
+
+
+def test_one_channel_may_say_the_same_as_itself():
+    assert one_channel(combine="same").message_symbols == 1
+
+
+@pytest.mark.parametrize(("ticks", "count"), [(1, 0), (2, 0), (3, 1), (10, 4), (11, 5)])
+def test_no_bin_at_half_the_rate_or_beyond_is_counted(ticks, count):
+    assert count_bins(ticks, 50.0, (1.0, 1000.0)) == count
 
 
 def test_edges_of_the_band_belong_to_it():

@@ -210,9 +210,11 @@ def test_under_simulated_time_ticks_follow_that_time(start, tmp_path, speed_up):
     heard = [each for each in driven.heard() if any(each["twist"])][20:]
     times_s = np.array([each["ros"] for each in heard])
     record = read_journal(driven.journal_path)
-    ticks = record.ticks[-1] - record.ticks[20]
-    assert ticks / (record.times_s[-1] - record.times_s[20]) == pytest.approx(50.0, rel=0.02)
-    assert (len(times_s) - 1) / (times_s[-1] - times_s[0]) == pytest.approx(50.0, rel=0.1)
+    ticks, seconds = record.ticks[-1] - record.ticks[20], record.times_s[-1] - record.times_s[20]
+    assert ticks / seconds == pytest.approx(50.0, rel=0.02)
+    # A busy host misses ticks, which have no rows and no twists.
+    sent_hz = (len(record.ticks) - 21) / seconds
+    assert (len(times_s) - 1) / (times_s[-1] - times_s[0]) == pytest.approx(sent_hz, rel=0.1)
     # Three times as fast, a busy host may publish too rarely.
     assert speed_up > 1.0 or "/clock advances" not in driven.node.output
 
