@@ -18,6 +18,8 @@ _CONVERGED = 1e-12
 # descent, so that the integrand falls like a Gaussian even where d is small.
 # Below the axis the integrand is the complex conjugate.
 _STEP = 0.5
+_HEAVY = 100.0
+_MOST_BENT = 0.15
 _HEIGHTS = np.arange(0.0, 8.5, _STEP)
 
 
@@ -43,6 +45,9 @@ def log_mean_sphere(linear: Floats, quadratic: Floats) -> Floats:
     curvature = np.sum(0.5 / shifted**2 + squared / shifted**3, axis=-1)
     width = 1.0 / np.sqrt(curvature)
     bend = np.sum(1.0 / shifted**3 + 3.0 * squared / shifted**4, axis=-1) * width**3 / 6.0
+    # A far bent contour would pass round the poles of large weights on elements other than the saddle's nearest.
+    heavy = np.max(squared * (spread > 0.0), axis=-1) > _HEAVY
+    bend = np.where(heavy, np.minimum(bend, _MOST_BENT), bend)
     steps = 1j * _HEIGHTS - bend[..., None] * _HEIGHTS**2
     place = shifted[..., None, :] + (width[..., None] * steps)[..., None]
     exponent = np.sum(-0.5 * np.log(place) + 0.5 * squared[..., None, :] / place, axis=-1)

@@ -3,7 +3,7 @@
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -153,6 +153,7 @@ VECTORS = st.integers(2, 40).flatmap(
 
 
 @given(VECTORS)
+@example((np.array([0.0, 146.0, 0.0, 0.0]), np.array([0.0, 113.0, 113.0, 113.0])))
 def test_the_mean_lies_between_jensen_s_bound_and_the_largest(weights):
     linear, quadratic = weights
     found = float(log_mean_sphere(linear, quadratic))
