@@ -13,7 +13,6 @@ from mtm_audit.model.track import Floats
 _EARLIEST_S, _LATEST_S = -0.04, 0.42
 _SHIFTS = np.arange(-4, 5)
 _RATE_STEPS = np.arange(-2, 3)
-_NOMINAL_STEPS = np.arange(-1, 2)
 # Clocks that are off by more are possible but rare: the scale of a Cauchy prior over relative rates.
 _USUAL_RATE_ERROR = 0.003
 
@@ -61,8 +60,7 @@ def neighbourhood(span: Span, timing: Timing, onset: Onset) -> Neighbourhood:
     pivot = 0 if known_s is not None else int(span.numbers[len(span.numbers) // 2])
     spacing = half_s / (span.lasts_s if known_s is not None else 0.5 * span.lasts_s)
     nearest = round((timing.rate_hz / span.nominal_hz - 1.0) / spacing)
-    # The nominal rate is likelier than all others together, whatever the search preferred.
-    relative = np.unique(np.concatenate([nearest + _RATE_STEPS, _NOMINAL_STEPS])) * spacing
+    relative = (nearest + _RATE_STEPS) * spacing
     if known_s is not None:
         shifts_s = np.arange(math.floor(_EARLIEST_S / half_s), math.ceil(_LATEST_S / half_s) + 1) * half_s
         pivot_s, count = known_s, len(shifts_s)
