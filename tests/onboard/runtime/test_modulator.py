@@ -350,3 +350,30 @@ def test_a_message_queued_before_the_start_is_ready_at_the_start():
         with patch.object(book, "samples", side_effect=AssertionError("derived while sending")):
             modulator.add(tick, BASE)
         modulator.prepare(tick)
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+@pytest.mark.parametrize("symbol", [-1, 4])
+def test_a_wrong_symbol_is_refused_before_it_waits(schedule, symbol):
+    modulator = Modulator(small_codebook(schedule=schedule), "a", (0,))
+    with pytest.raises(MtmError, match="choose 0 to 3"):
+        modulator.queue((symbol,))
+    with pytest.raises(MtmError, match="choose 0 to 3"):
+        Modulator(small_codebook(schedule=schedule), "a", (symbol,))
+    played(modulator, range(130))
+    assert modulator.message == (0,)
+
+
+def test_a_slot_s_symbols_are_asked_for_once():
+    asked = []
+
+    class Asked(Counting):
+        def symbols(self, slot):
+            asked.append(slot)
+            return super().symbols(slot)
+
+    modulator = Modulator(small_codebook(schedule="rolling"), "b", Asked())
+    asked.clear()
+    # The first window of slot 4 is ready before slot 3 ends.
+    played(modulator, range(470))
+    assert asked == [1, 2, 3, 4]
