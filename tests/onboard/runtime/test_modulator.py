@@ -312,3 +312,68 @@ def test_between_windows_of_a_queued_message_the_loop_may_run():
         assert sleep.call_args_list == []
         modulator.queue((1, 1, 3))
     assert [call.args for call in sleep.call_args_list] == [(0.001,)] * 3
+
+
+def test_a_message_played_once_is_asked_for_no_later_slot():
+    asked = []
+
+    class Asked(Counting):
+        def symbols(self, slot):
+            asked.append(slot)
+            return super().symbols(slot)
+
+    played(Modulator(small_codebook(schedule="rolling"), "a", Asked(), repeat=False), range(300))
+    assert set(asked) == {0}
+
+
+def test_a_channel_of_body_axes_is_what_a_runtime_requires():
+    Modulator(small_codebook(), "a", (1,)).require_body_axes()
+    with pytest.raises(MtmError, match="only vx, vy, wz can be added"):
+        Modulator(small_codebook(channels=(Channel("x", "x", ("vx", "lift"), 1, 0.1),)), "x", (1,)).require_body_axes()
+
+
+@pytest.mark.parametrize(("schedule", "windows"), [("fixed", 3), ("rolling", 12)])
+def test_each_window_is_computed_once(schedule, windows):
+    book = small_codebook(schedule=schedule)
+    with patch.object(book, "samples", wraps=book.samples) as samples:
+        # Eleven windows of 40 ticks are begun, and the next is ready.
+        played(Modulator(book, "b", (3, 0, 2)), range(-30, 420))
+    assert samples.call_count == windows
+
+
+def test_a_message_queued_before_the_start_is_ready_at_the_start():
+    book = small_codebook(schedule="rolling")
+    modulator = Modulator(book, "b", (3, 0, 2))
+    for tick in range(-10, 130):
+        if tick == -5:
+            modulator.queue((1, 1, 3))
+        with patch.object(book, "samples", side_effect=AssertionError("derived while sending")):
+            modulator.add(tick, BASE)
+        modulator.prepare(tick)
+
+
+@pytest.mark.parametrize("schedule", ["fixed", "rolling"])
+@pytest.mark.parametrize("symbol", [-1, 4])
+def test_a_wrong_symbol_is_refused_before_it_waits(schedule, symbol):
+    modulator = Modulator(small_codebook(schedule=schedule), "a", (0,))
+    with pytest.raises(MtmError, match="choose 0 to 3"):
+        modulator.queue((symbol,))
+    with pytest.raises(MtmError, match="choose 0 to 3"):
+        Modulator(small_codebook(schedule=schedule), "a", (symbol,))
+    played(modulator, range(130))
+    assert modulator.message == (0,)
+
+
+def test_a_slot_s_symbols_are_asked_for_once():
+    asked = []
+
+    class Asked(Counting):
+        def symbols(self, slot):
+            asked.append(slot)
+            return super().symbols(slot)
+
+    modulator = Modulator(small_codebook(schedule="rolling"), "b", Asked())
+    asked.clear()
+    # The first window of slot 4 is ready before slot 3 ends.
+    played(modulator, range(470))
+    assert asked == [1, 2, 3, 4]
