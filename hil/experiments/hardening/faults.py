@@ -58,6 +58,7 @@ _SYMBOLS = (3, 1)
 _WINDOW_TICKS = 200
 _SAME = 2e-4  # above what plaintext rounds off, in m/s and rad/s
 _MOSTLY = 0.75
+_WRONG_AT_MOST = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -205,6 +206,7 @@ def _decoded(run: FaultRun, key: Key, draw: np.random.Generator) -> dict[str, Sc
     times_s = np.arange(len(run.motion), dtype=np.float64) * SAMPLE_PERIOD_S
     trajectory = Trajectory("robot0", times_s, run.motion[:, :2], run.motion[:, 2])
     tracks = capture(MotionCapture(), [trajectory], draw, end_s=SILENT_S)
-    decoding = decode_tracks(tracks, key, DecodeSettings(onset_s=START_S))
+    # Half of the windows may be missing; whether the rest came through is no question of one wrong answer in 10,000.
+    decoding = decode_tracks(tracks, key, DecodeSettings(onset_s=START_S, threshold=_WRONG_AT_MOST))
     is_decoded = decoding.verdict == "decoded" and decoding.symbols == _SYMBOLS
     return {"is_decoded": is_decoded, "p_value": decoding.evidence.p_value}

@@ -46,7 +46,7 @@ CONDITIONS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PowerSummary:
     """One condition, message length and threshold, in rollouts: `likeliest` are those whose likeliest symbols are the
     message's, `likeliest_absent` those of them that are absent.

@@ -30,7 +30,7 @@ FAULTS = ("exchanged", "silent", "exchanged and silent", "one channel twice")
 _SIGMA = 0.1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SureSummary:
     """One plant at one threshold, in messages.
 
@@ -49,7 +49,7 @@ class SureSummary:
     refused: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Job:
     """A recording: its scheme's sizes, how loud and how often the message is played, and what is known of its start."""
 
@@ -101,9 +101,16 @@ def _summary(plant: str, results: Sequence[Values], threshold: float) -> SureSum
         for verdict, result in zip(verdicts, results, strict=True)
     )
     return SureSummary(
-        plant, threshold, len(results), right.count(False), right.count(True), verdicts.count("inconclusive"),
-        verdicts.count("absent"), absent_right, verdicts.count("refused"),
-    )  # fmt: skip
+        plant=plant,
+        threshold=threshold,
+        messages=len(results),
+        wrong=right.count(False),
+        right=right.count(True),
+        inconclusive=verdicts.count("inconclusive"),
+        absent=verdicts.count("absent"),
+        likeliest_absent=absent_right,
+        refused=verdicts.count("refused"),
+    )
 
 
 def _single(vehicle: Vehicle, draw: np.random.Generator) -> tuple[Key, _Job, list[Track], tuple[int | None, ...]]:

@@ -23,7 +23,7 @@ _STREAM, _RECORDING_STREAM = 702, 703
 _KEYS_A_CELL = 50
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ValiditySummary:
     """Keys on recordings of one kind: `keys` read, `refused` those of which nothing could be read, `below` how many
     p-values are at most each of `LEVELS`, `not_finite` evidence that is no number. `mean_e` is the mean e-value of any

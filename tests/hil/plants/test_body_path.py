@@ -20,7 +20,7 @@ def test_a_step_to_the_left_of_a_turned_body_goes_backwards():
     assert path_xy_m(velocities, STEP_S)[-1] == pytest.approx([-1.0, 0.0], abs=1e-9)
 
 
-def test_slip_is_stationary_with_the_deviation_and_correlation_asked():
+def test_slip_is_stationary_as_asked():
     noise = slip((400, 2000), STEP_S, 0.04, 0.1, np.random.default_rng(2))
     assert noise[[0, -1]].std(axis=1) == pytest.approx([0.04, 0.04], rel=0.06)
     lag = 10

@@ -35,7 +35,7 @@ def test_a_lag_has_made_up_all_but_1_e_after_its_time():
     assert lagged(STEP, STEP_S, 0.2)[19] == pytest.approx(1 - np.exp(-1))
 
 
-def test_a_second_order_plant_settles_at_its_demand_and_overshoots():
+def test_a_second_order_plant_overshoots_and_settles():
     followed = second_order(STEP, STEP_S, 1.0, 0.3)
     assert followed[-1] == pytest.approx(1.0, abs=1e-3)
     # exp(-pi zeta / sqrt(1 - zeta^2))
@@ -47,7 +47,7 @@ def test_a_notch_takes_its_frequency_out_and_no_other():
     assert settled_gain(lambda demand: notched(demand, STEP_S, 2.0, 1.0), 0.2) == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_saturated_gain_is_one_for_small_demands_and_never_above_its_limit():
+def test_a_saturated_gain_keeps_small_demands_and_its_limit():
     assert saturated(np.array([[0.001, 5.0]]), 0.3)[0] == pytest.approx([0.001, 0.3], rel=1e-4)
 
 
@@ -56,13 +56,13 @@ def test_friction_holds_a_vehicle_whose_demand_is_small():
     assert np.array_equal(sticking(demand, 0.06), [[0.0, 0.0], [0.05, 0.05]])
 
 
-def test_a_slew_limit_bounds_the_acceleration_and_is_met_in_the_end():
+def test_a_slew_limit_bounds_the_acceleration():
     followed = slew_limited(STEP, STEP_S, 0.5)
     assert np.diff(followed, axis=0).max() <= 0.5 * STEP_S + 1e-12
     assert followed[150, 0] < 1.0 == followed[-1, 0]
 
 
-def test_play_swallows_a_small_motion_and_lags_a_large_one_by_half():
+def test_play_swallows_small_motion_and_lags_large_one():
     # Amplitudes of the path: 1 / (2 pi f).
     small, large = with_play(tone(2.0, 0.02), STEP_S, 0.01), with_play(tone(0.1, 1.0), STEP_S, 0.01)
     assert np.abs(small[200:]).max() < 1e-12

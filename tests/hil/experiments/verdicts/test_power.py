@@ -34,7 +34,7 @@ def test_rollouts_are_counted_by_verdict():
     assert (summary.likeliest, summary.likeliest_absent) == (3, 1)
 
 
-def test_the_smallest_message_is_the_one_from_which_on_most_are_decoded():
+def test_from_the_smallest_message_on_most_are_decoded():
     by_ticks = {100: "decoded", 150: "absent", 200: "decoded", 300: "decoded"}
     summaries = [item for ticks, name in by_ticks.items() for item in summarise_power(ONCE, ticks, [result(name)])]
     assert smallest_decoded(summaries, ONCE.name, 1e-4) == 200

@@ -15,7 +15,7 @@ def sending(**changes):
     return Sending(**{**given, **changes})
 
 
-def test_the_noise_is_that_of_the_onboard_modulator_held_for_a_tick():
+def test_the_noise_is_that_of_the_onboard_modulator():
     times_s = np.arange(0, 450) * 0.01
     noise = sending().noise(times_s)
     modulator = Modulator(KEY.codebook(), CHANNEL.name, (3, 1))
@@ -26,7 +26,7 @@ def test_the_noise_is_that_of_the_onboard_modulator_held_for_a_tick():
     assert np.all(noise[450:] == 0.0)
 
 
-def test_a_message_that_is_played_again_begins_anew_and_may_have_begun_before():
+def test_a_message_played_again_begins_anew():
     times_s = np.arange(0, 900) * 0.01
     again = sending(messages=3).noise(times_s)
     assert np.array_equal(again[50:450], again[450:850])

@@ -9,7 +9,7 @@ from mtm_audit.model.track import FARTHEST
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
-def test_a_hostile_recording_repeats_itself_and_differs_by_number(kind):
+def test_a_hostile_recording_repeats_by_its_number(kind):
     one, again, other = (hostile_recording(kind, number, 5) for number in (0, 0, 1))
     assert all(
         np.array_equal(a.positions, b.positions, equal_nan=True) for a, b in zip(one.tracks, again.tracks, strict=True)
