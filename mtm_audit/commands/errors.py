@@ -9,6 +9,9 @@ from typing import Never
 
 import typer
 
+# Longer than it takes to remove what was half written.
+_AGAIN_S = 5.0
+
 
 @contextmanager
 def reported(program: str, when_interrupted: str) -> Iterator[None]:
@@ -38,6 +41,7 @@ def reported(program: str, when_interrupted: str) -> Iterator[None]:
         print(f"{program}: interrupted; {when_interrupted}", file=sys.stderr)
         raise typer.Exit(130) from error
     finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGTERM, former)
 
 
@@ -50,4 +54,7 @@ def _discard_output() -> None:
 
 
 def _terminated(*_: object) -> Never:
+    # An exception that comes up inside a destructor is dropped, and the request with it; so it is made again.
+    signal.signal(signal.SIGALRM, _terminated)
+    signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
     raise SystemExit(128 + signal.SIGTERM)
