@@ -54,7 +54,8 @@ def _discard_output() -> None:
 
 
 def _terminated(*_: object) -> Never:
-    # An exception that comes up inside a destructor is dropped, and the request with it; so it is made again.
+    # An exception that comes up inside a destructor is dropped, and one that comes up between taking a lock and
+    # guarding it leaves what closes waiting for that lock. So the request is made again.
     signal.signal(signal.SIGALRM, _terminated)
     signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
     raise SystemExit(128 + signal.SIGTERM)
