@@ -29,10 +29,6 @@ class Levels:
     reliefs: Floats
     log_priors: Floats
 
-    def chosen(self, places: slice) -> "Levels":
-        """Some of the levels, with their priors as they are."""
-        return Levels(self.magnitudes[places], self.reliefs[places], self.log_priors[places])
-
 
 @lru_cache(maxsize=1)
 def all_levels() -> Levels:

@@ -84,10 +84,7 @@ class _Own:
     def chosen(self) -> tuple[Hypotheses, Floats]:
         """The hypotheses that say most under the prior, and their log priors."""
         channel, terms = self.channel, self.terms
-        coarse = channel.mixed(terms.coarse).sum(axis=-1)
-        pairs = _largest(logsumexp(coarse, axis=(1, 2)) + terms.log_priors, _PAIRS)
-        fine = channel.mixed(terms.fine(pairs)).sum(axis=-1) + _prior(terms, pairs)
-        places = _largest(fine.ravel(), _HYPOTHESES)
+        pairs, places, _ = _selected(terms, lambda table_of: channel.mixed(table_of(terms)).sum(axis=-1))
         return terms.hypotheses(pairs, places), _prior(terms, pairs).ravel()[places]
 
     @cached_property
@@ -107,6 +104,19 @@ def _prior(terms: Terms, pairs: Integers) -> Floats:
     levels = all_levels().log_priors[:, None] - np.log(len(terms.channel.turns))
     cameras = np.broadcast_to(levels, (len(levels), len(terms.channel.turns)))
     return np.asarray(terms.log_priors[pairs][:, None, None] + cameras)
+
+
+# Takes one of a channel's tables out of its terms, and what channels say by such tables.
+_TableOf = Callable[[Terms], Floats]
+_Said = Callable[[_TableOf], Floats]
+
+
+def _selected(terms: Terms, said: _Said) -> tuple[Integers, Integers, Floats]:
+    """The hypotheses of which most is said, prior included: pairs, places in their fine table, log weights of these."""
+    pairs = _largest(logsumexp(said(lambda table: table.coarse), axis=(1, 2)) + terms.log_priors, _PAIRS)
+    fine = (said(lambda table: table.fine(pairs)) + _prior(terms, pairs)).ravel()
+    places = _largest(fine, _HYPOTHESES)
+    return pairs, places, fine[places]
 
 
 def _largest(values: Floats, count: int) -> Integers:
@@ -196,7 +206,7 @@ def _together(own: Sequence[_Own], showing: Sequence[int], position: int, symbol
         return -np.inf
     tables = [channel.at(_anchor(channels, channel)) for channel in channels]
 
-    def said(tables_of: Callable[[Terms], Floats]) -> Floats:
+    def said(tables_of: _TableOf) -> Floats:
         found = []
         for channel, terms, place in zip(channels, tables, places, strict=True):
             if place is not None:
@@ -204,9 +214,7 @@ def _together(own: Sequence[_Own], showing: Sequence[int], position: int, symbol
         return np.asarray(np.sum(found, axis=0))
 
     first = tables[0]
-    pairs = _largest(logsumexp(said(lambda table: table.coarse), axis=(1, 2)) + first.log_priors, _PAIRS)
-    fine = (said(lambda table: table.fine(pairs)) + _prior(first, pairs)).ravel()
-    chosen = _largest(fine, _HYPOTHESES)
+    pairs, chosen, _ = _selected(first, said)
     exact = said(lambda table: table.exact(table.hypotheses(pairs, chosen)))
     return float(logsumexp(exact + _prior(first, pairs).ravel()[chosen]))
 
@@ -242,7 +250,7 @@ def _by_others(own: Sequence[_Own], row: int, showing: Sequence[int], position: 
     terms = channel.at(timing)
     paid = 0.0 if elsewhere else terms.log_prior
 
-    def said(table_of: Callable[[Terms], Floats]) -> Floats:
+    def said(table_of: _TableOf) -> Floats:
         total: Floats = np.zeros(1)
         for other in elsewhere:
             theirs = other.channel
@@ -253,9 +261,6 @@ def _by_others(own: Sequence[_Own], row: int, showing: Sequence[int], position: 
             total = total + np.delete(values, place[0], axis=-1).sum(axis=-1)
         return total
 
-    coarse = logsumexp(said(lambda table: table.coarse), axis=(1, 2)) + terms.log_priors
-    pairs = _largest(coarse, _PAIRS)
-    weights = (said(lambda table: table.fine(pairs)) + _prior(terms, pairs)).ravel()
-    places = _largest(weights, _HYPOTHESES)
+    pairs, places, log_weights = _selected(terms, said)
     exact = channel.by_position(terms.exact(terms.hypotheses(pairs, places)))[:, place[0], place[1]]
-    return float(logsumexp(exact + log_softmax(weights[places])) + paid)
+    return float(logsumexp(exact + log_softmax(log_weights)) + paid)
