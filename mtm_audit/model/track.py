@@ -38,6 +38,8 @@ class Track:
         count = len(self.times_s)
         if self.positions.shape != (count, len(self.axes)) or self.valid.shape != (count,):
             raise MtmError(f"track {self.name!r}: times, positions and validity differ in length; record it anew")
+        if self.headings_rad is not None and self.headings_rad.shape != (count,):
+            raise MtmError(f"track {self.name!r}: times and headings differ in length; record it anew")
         if count and not np.all(np.isfinite(self.times_s)):
             raise MtmError(f"track {self.name!r} has times that are not numbers; remove those lines")
         if np.any(np.diff(self.times_s) <= 0):

@@ -14,6 +14,7 @@ docs/evidence.md has the theorem, and what is random and what is fixed in it.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +54,24 @@ class MessageEvidence:
     presence_nats: float
     channels_nats: tuple[float, ...]
     symbols: tuple[SymbolEvidence | None, ...]
+
+    def discounted(self, nats: float) -> "MessageEvidence":
+        """The same where this was one of several hypotheses, whose log prior probability is `-nats`."""
+        symbols = (None if item is None else SymbolEvidence(item.symbol, item.nats - nats) for item in self.symbols)
+        channels = (item - nats for item in self.channels_nats)
+        return MessageEvidence(self.presence_nats - nats, tuple(channels), tuple(symbols))
+
+    def by_channel(self, firsts: Sequence[int]) -> "MessageEvidence":
+        """The same with channels that were weighed in parts put together; a channel's parts begin at each of `firsts`.
+
+        A part that shows nothing is taken for silent, at even odds.
+        """
+        bounds = [*firsts, len(self.channels_nats)]
+        parts = [np.array(self.channels_nats[first:last]) for first, last in pairwise(bounds)]
+        whole = (
+            float(each[0]) if len(each) == 1 else float(np.sum(np.logaddexp(each, 0.0) - np.log(2.0))) for each in parts
+        )
+        return MessageEvidence(self.presence_nats, tuple(whole), self.symbols)
 
 
 def weigh_message(
@@ -147,7 +166,7 @@ def _presence(own: Sequence[_Own]) -> float:
     if len(own) == 1:
         return float(apart[0])
     if not _alike(channels):
-        return alone
+        return _presence_by_kind(own)
     tables = [channel.at(_anchor(channels, channel)) for channel in channels]
 
     def together(values: Sequence[Floats]) -> Floats:
@@ -164,6 +183,19 @@ def _presence(own: Sequence[_Own]) -> float:
     exact = together([terms.exact_presence(terms.hypotheses(pairs, places)) for terms in tables])
     shared = float(logsumexp(exact + _prior(first, pairs).ravel()[places]))
     return float(np.logaddexp(shared, alone) - np.log(2.0))
+
+
+def _presence_by_kind(own: Sequence[_Own]) -> float:
+    """Channels that can share a hypothesis together, and the kinds apart."""
+    kinds: list[list[_Own]] = []
+    for item in own:
+        mine = next((kind for kind in kinds if _alike([kind[0].channel, item.channel])), None)
+        if mine is None:
+            kinds.append([item])
+        else:
+            mine.append(item)
+    apart = np.array([_presence(kind) for kind in kinds])
+    return float(np.sum(np.logaddexp(apart, 0.0) - np.log(2.0)))
 
 
 def _blurred(shared: Floats, own: float) -> Floats:
@@ -239,9 +271,8 @@ def _by_others(own: Sequence[_Own], row: int, showing: Sequence[int], position: 
     item = own[row]
     channel = item.channel
     place = _column(channel, position, symbol)
-    elsewhere = [other for number, other in enumerate(own) if number not in showing]
-    if not _alike([item.channel for item in [item, *elsewhere]]):
-        elsewhere = []
+    others = [other for number, other in enumerate(own) if number not in showing]
+    elsewhere = [other for other in others if _alike([channel, other.channel])]
     mine = len(channel.shown) > 1
     if place is None or not (elsewhere or mine):
         return None

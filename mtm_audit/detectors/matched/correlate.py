@@ -54,8 +54,8 @@ class Heard:
     """The motion correlated with each tone at each lag, at one rate; the same for every codebook.
 
     `projections` (observed axes, 2 K, lags): real and imaginary parts; `tones_hz` (K,); `steady` (observed axes,
-    2 K) power of each tone's whitened response in a cell; `seen` (observed axes, lags) weight of the cells that a window starting there
-    would have. Lag 0 is `lead` cells before the recording.
+    2 K) power of each tone's whitened response in a cell; `seen` (observed axes, lags) weight of the cells that a
+    window starting there would have. Lag 0 is `lead` cells before the recording.
     """
 
     projections: NDArray[np.float32]

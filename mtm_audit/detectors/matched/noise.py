@@ -38,7 +38,7 @@ class NoiseModel:
     @property
     def order(self) -> int:
         """Samples of history that one whitened sample takes, the same for all axes."""
-        return self.filters[0].shape[1] - 1
+        return int(self.filters[0].shape[1]) - 1
 
 
 def model_order(samples: int) -> int:
@@ -90,7 +90,7 @@ def fit_noise(signals: Sequence[Floats], seen: Sequence[Bools], order: int) -> N
         np.repeat(mask[None, :], len(signal), axis=0) * 1.0 for signal, mask in zip(signals, usable, strict=True)
     ]
     scales: list[Floats] = [np.maximum(np.std(np.diff(signal, axis=1), axis=1), 1e-12) for signal in signals]
-    whitening_filter = np.ones(1)
+    whitening_filter: Floats = np.ones(1)
     for _ in range(_ROUNDS):
         whitening_filter = _solve(signals, weights, scales, order)
         for index, signal in enumerate(signals):
@@ -153,7 +153,8 @@ def _own_filter(signal: Floats, seen: Bools, shared: Floats, scale: float) -> Fl
 
 
 def _own_fit(signal: Floats, usable: Bools, order: int, scale: float) -> Floats:
-    weights, scales, found = usable[None] * 1.0, np.array([scale]), np.ones(1)
+    weights, scales = usable[None] * 1.0, np.array([scale])
+    found: Floats = np.ones(1)
     for _ in range(_OWN_ROUNDS):
         found = _solve([signal[None]], [weights], [scales], order)
         scales, weights = _doubted(whitened(signal[None], found), weights, usable, order)

@@ -32,9 +32,10 @@ class Places:
 class Projections:
     """A body's motion projected on the tones, in units of its interference.
 
-    One unit for all axes, since a camera turns axes into each other whose interference differs. `linear` (timings, plants, groups, observed axes, 2 K): correlations with unit tones, real parts first; `seen`
-    (timings, groups, observed axes): how many cells count; `power` (plants, observed axes, K): of a unit tone's whitened
-    response in a cell; `cells`: how many a window has.
+    One unit for all axes, since a camera turns axes into each other whose interference differs. `linear` (timings,
+    plants, groups, observed axes, 2 K): correlations with unit tones, real parts first; `seen` (timings, groups,
+    observed axes): how many cells count; `power` (plants, observed axes, K): of a unit tone's whitened response in a
+    cell; `cells`: how many a window has.
     """
 
     linear: Floats
