@@ -138,7 +138,7 @@ class _Reader:
             refusals=best.refusals,
             evidence=Evidence(None if message is None else message.presence_nats, decoys),
             message=message,
-            channel_nats={} if message is None else dict(zip(best.parts, message.channels_nats, strict=True)),
+            channel_nats={} if message is None else message.channels_nats,
             also_shows=also_shows or {},
         )
 
@@ -178,9 +178,7 @@ class _Reader:
             channel_terms(self.codebooks[0], part.channel, part.result, self.start.onset, apart=apart) for part in flat
         ]
         costs = [association.log_priors[part.channel.body] for part in flat]
-        weighed = weigh_message(terms, costs, scheme.message_symbols, symbols=scheme.framing is None)
-        names = [part.channel.name for part in flat]
-        return weighed.by_channel([names.index(name) for name in parts])
+        return weigh_message(terms, costs, scheme.message_symbols, symbols=scheme.framing is None)
 
     def in_doubt(self, readings: Readings) -> list[str]:
         """Bodies with a channel whose motion does not show its symbols, or that no track shows."""

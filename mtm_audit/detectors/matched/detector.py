@@ -107,12 +107,13 @@ class MatchedDetector:
         own = [channels[number] for number in numbers]
         noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
         timings = [searched[number][0].timing for number in numbers]
-        windows = _all_windows(codebook, own, moved, timings, onset)
+        shown = [_numbers(codebook, *each, onset) for each in zip(own, moved, timings, strict=True)]
+        windows = _all_windows(codebook, own, moved, timings, shown)
         found = estimate(windows, moved, noise, self._profile)
         better = refined_timing(found, windows, moved, timings)
         if better != timings:
             timings = better
-            windows = _all_windows(codebook, own, moved, timings, onset)
+            windows = _all_windows(codebook, own, moved, timings, shown)
             found = estimate(windows, moved, noise, self._profile)
         readings = {}
         for row, number in enumerate(numbers):
@@ -204,12 +205,11 @@ def _all_windows(
     channels: Sequence[Channel],
     motions: Sequence[Motion],
     timings: Sequence[Timing],
-    onset: Onset,
+    shown: Sequence[range],
 ) -> list[Window]:
     windows = []
-    for number, (channel, motion, timing) in enumerate(zip(channels, motions, timings, strict=True)):
-        numbers = _numbers(codebook, channel, motion, timing, onset)
-        windows += make_windows(codebook, channel, motion, timing, number, numbers)
+    for row, (channel, motion, timing, numbers) in enumerate(zip(channels, motions, timings, shown, strict=True)):
+        windows += make_windows(codebook, channel, motion, timing, row, numbers)
     return windows
 
 
