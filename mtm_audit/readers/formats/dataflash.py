@@ -1,5 +1,6 @@
 """ArduPilot's DataFlash logs (.BIN), by pymavlink: the estimator's position north and east, and its yaw."""
 
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,8 @@ def read_dataflash(path: Path, options: ReadOptions, warn: Warn) -> Log:
     """
     reader = library("pymavlink.DFReader", path, WHAT)
     with foreign(path, WHAT):
-        rows = _rows(reader.DFReader_binary(str(path), zero_time_base=False))
+        with closing(reader.DFReader_binary(str(path), zero_time_base=False)) as log:
+            rows = _rows(log)
         present = [name for kind in (*_ESTIMATES, *_GLOBAL) for name in sorted(rows) if name.partition(".")[0] == kind]
         if options.topics:
             check_topics(path, options.topics, present)

@@ -62,6 +62,12 @@ class Columns:
     height: Column | None = None
     turn: tuple[Column, ...] = ()
 
+    @property
+    def indices(self) -> frozenset[int]:
+        """Where the columns are."""
+        height = () if self.height is None else (self.height,)
+        return frozenset(column.index for column in (self.time, *self.position, *height, *self.turn))
+
 
 def header_columns(line: str) -> tuple[Column, ...]:
     """The columns that a header line names."""
@@ -96,7 +102,7 @@ def read_columns(
     bare = header[1].lstrip().lstrip("#%").strip()
     separator = separator_of(bare)
     names = [cell.strip() for cell in cells_of(bare, separator)]
-    table = read_table(path, content, separator, len(names), f"'{','.join(names)[:120]}'")
+    table = read_table(path, content, separator, len(names), f"'{','.join(names)[:120]}'", columns.indices)
     times = table.values[:, columns.time.index]
     # A header's own word comes first, then what the size of the times leaves no doubt about.
     stated = columns.time.unit if columns.time.unit in SECONDS else None

@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,11 +56,18 @@ def cells_of(line: str, separator: str | None) -> list[str]:
         raise ValueError(str(error)) from error
 
 
-def read_table(path: Path, content: Iterable[Line], separator: str | None, columns: int, form: str) -> Table:
+def read_table(
+    path: Path,
+    content: Iterable[Line],
+    separator: str | None,
+    columns: int,
+    form: str,
+    wanted: Collection[int] | None = None,
+) -> Table:
     """The lines as numbers; an empty cell is NaN, and what is beyond the columns is left out when it is empty.
 
-    `form` is what a line should look like. Raises MtmError that names the line when one does not hold as many numbers,
-    and when there is no line.
+    `form` is what a line should look like. Columns that are not among the `wanted` may hold words and become NaN.
+    Raises MtmError that names the line when one does not hold as many numbers, and when there is no line.
     """
     rows, lines = [], []
     for number, line in content:
@@ -71,7 +78,11 @@ def read_table(path: Path, content: Iterable[Line], separator: str | None, colum
             # Spreadsheets and some programs leave out what is empty at the end.
             if len(cells) != columns:
                 raise ValueError
-            rows.append([_number(cell, separator) for cell in cells])
+            numbers = (
+                _number(cell, separator) if wanted is None or index in wanted else np.nan
+                for index, cell in enumerate(cells)
+            )
+            rows.append(list(numbers))
         except ValueError as error:
             raise MtmError(
                 f"{path}, line {number}: expected {columns} numbers, {form}; mend or remove the line"
