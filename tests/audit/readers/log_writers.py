@@ -265,7 +265,7 @@ def _foxglove_protobuf(file, pose):
     from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
     from mcap_protobuf.writer import Writer
 
-    with Writer(file) as writer:
+    with Writer(file, chunk_size=65_536) as writer:
         for index, (time_s, place, turn) in enumerate(pose.rows()):
             message, stamp_ns = PoseInFrame(frame_id="map"), nanoseconds(time_s)
             message.timestamp.FromNanoseconds(stamp_ns)
