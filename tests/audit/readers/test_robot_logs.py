@@ -20,7 +20,6 @@ from tests.audit.readers.log_writers import (
     write_c3d,
     write_dataflash,
     write_foxglove,
-    write_lerobot,
     write_rosbag1,
     write_rosbag2,
     write_tlog,
@@ -373,25 +372,7 @@ def test_an_encoding_that_is_not_read_is_named(tmp_path):
         read_log(path)
 
 
-# Others
-
-
-def test_episodes_of_lerobot_are_chosen_by_number(tmp_path):
-    pytest.importorskip("pyarrow")
-    path = write_lerobot(tmp_path, POSE, OTHER)
-    with pytest.raises(MtmError, match="--topic: episode_0, episode_1"):
-        read_log(path)
-    contents, warnings = warned(path, topics=("episode_1",))
-    (track,) = contents.tracks
-    assert close(track, OTHER)
-    assert track.headings_rad == pytest.approx(OTHER.headings_rad, abs=1e-6)
-    assert ["nominal rate" in warning for warning in warnings] == [True]
-
-
-def test_joints_of_lerobot_are_axes_of_a_track(tmp_path):
-    pytest.importorskip("pyarrow")
-    (track,) = read_log(write_lerobot(tmp_path, POSE, names=("shoulder", "elbow", "wrist"))).tracks
-    assert (track.axes, track.unit) == (("shoulder", "elbow", "wrist"), "rad")
+# What is not installed
 
 
 @pytest.mark.parametrize(
