@@ -1,21 +1,40 @@
 """C3D: rigid bodies of named markers, by ezc3d."""
 
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mtm_audit.model.track import Floats
 from mtm_audit.readers.logs.body import Log, Warn
-from mtm_audit.readers.logs.libraries import foreign, library
+from mtm_audit.readers.logs.libraries import foreign, missing
 from mtm_audit.readers.logs.opening import Opening
-from mtm_audit.readers.logs.options import METRES, ReadOptions
+from mtm_audit.readers.logs.options import METRES, UP_AXES, ReadOptions
 from mtm_audit.readers.logs.rigid import grouped, rigid_body
 from mtm_onboard.protocol.errors import MtmError
 
 WHAT = "a C3D file"
 # The header counts frames in 16 bits, so what is longer is cut by one program and padded by another.
 _LONGEST_FRAMES = 65_535
+# The library takes about thirty times a file's size, and less than a second for its largest files.
+_SECONDS, _SECONDS_PER_MEGABYTE = 20, 2
+_MEGABYTES, _TIMES_FILE = 4096, 64
+
+
+@dataclass(frozen=True)
+class _Markers:
+    """Points (4, markers, n) and residuals (markers, n) as they are in the file, and what it says of them."""
+
+    points: Floats
+    residuals: Floats
+    labels: list[str]
+    rate_hz: float
+    unit: str
+    up: str
 
 
 def recognises_c3d(opening: Opening) -> bool:
@@ -27,35 +46,24 @@ def read_c3d(path: Path, options: ReadOptions, warn: Warn) -> Log:
     """Bodies of the markers before a colon or a number (Rover:1, Rover_Marker1), or as `options.bodies` name them.
 
     Lengths are of the parameter POINT:UNITS, times frames over POINT:RATE, and the z axis points up unless
-    POINT:X_SCREEN and POINT:Y_SCREEN say otherwise. A NaN or a residual below zero is unseen.
+    POINT:Y_SCREEN says otherwise. A NaN or a residual below zero is unseen.
     """
-    ezc3d = library("ezc3d", path, WHAT)
-    with foreign(path, WHAT):
-        content = ezc3d.c3d(str(path))
-        point = content["parameters"]["POINT"]
-        points = np.asarray(content["data"]["points"], dtype=float)
-        residuals = np.asarray(content["data"]["meta_points"]["residuals"], dtype=float)[0]
-        labels = _labels(content["parameters"], points.shape[1])
-        rate_hz = float(np.ravel(point["RATE"]["value"])[0])
-        unit, up = _word(point, "UNITS").lower(), _up(point)
-    if not points.shape[1] or not points.shape[2]:
+    markers = _markers(path)
+    frames = markers.points.shape[2]
+    if not markers.points.shape[1] or not frames:
         raise MtmError(f"{path} is {WHAT} without a marker; export the markers")
-    if not (np.isfinite(rate_hz) and rate_hz > 0.0):
-        raise MtmError(f"{path} is {WHAT} whose rate is {rate_hz:g} frames a second; export it again")
-    if points.shape[2] >= _LONGEST_FRAMES:
+    if not (np.isfinite(markers.rate_hz) and markers.rate_hz > 0.0):
+        raise MtmError(f"{path} is {WHAT} whose rate is {markers.rate_hz:g} frames a second; export it again")
+    if frames >= _LONGEST_FRAMES:
         warn(f"{path} has as many frames as the format can count; if the recording went on, save it in pieces")
-    markers_m = np.moveaxis(points[:3], 0, -1).swapaxes(0, 1) * options.metres(unit if unit in METRES else None)
-    markers_m[(residuals.T < 0.0) | ~np.all(np.isfinite(markers_m), axis=2)] = np.nan
-    return _log(path, labels, markers_m, np.arange(points.shape[2]) / rate_hz, options.up or up, options, warn)
-
-
-def _log(
-    path: Path, labels: list[str], markers_m: Floats, times_s: Floats, up: str, options: ReadOptions, warn: Warn
-) -> Log:
-    groups = grouped(labels, options.bodies, str(path))
+    unit_m = options.metres(markers.unit if markers.unit in METRES else None)
+    markers_m = np.moveaxis(markers.points[:3], 0, -1).swapaxes(0, 1) * unit_m
+    markers_m[(markers.residuals.T < 0.0) | ~np.all(np.isfinite(markers_m), axis=2)] = np.nan
+    up = options.up or (markers.up if markers.up in UP_AXES else "z")
+    times_s = np.arange(frames) / markers.rate_hz
     bodies = [
         rigid_body(name, times_s, markers_m[:, members], up, str(path), warn)
-        for name, members in groups.items()
+        for name, members in grouped(markers.labels, options.bodies, str(path)).items()
         if np.any(np.isfinite(markers_m[:, members]))
     ]
     if not bodies:
@@ -63,20 +71,35 @@ def _log(
     return Log(tuple(bodies))
 
 
-def _labels(parameters: Any, count: int) -> list[str]:
-    """All labels; beyond 255 of them the format goes on in LABELS2, LABELS3 and so on."""
-    point = parameters["POINT"]
-    keys = ["LABELS", *(f"LABELS{number}" for number in range(2, 20))]
-    found = [str(label).strip() for key in keys if key in point for label in point[key]["value"]][:count]
-    return found + [f"unnamed {number}" for number in range(len(found), count)]
+def _markers(path: Path) -> _Markers:
+    """The file's markers, read by another process that may be bounded."""
+    if _is_missing("ezc3d"):
+        raise missing("ezc3d", path, WHAT)
+    megabytes = path.stat().st_size >> 20
+    with tempfile.TemporaryDirectory() as folder, foreign(path, WHAT):
+        out = Path(folder) / "points.npz"
+        # Without -P a file of the recording's folder could take the place of a library.
+        command = [sys.executable, "-P", "-m", "mtm_audit.readers.formats.c3d_points", str(path.absolute()), str(out)]
+        try:
+            done = subprocess.run(
+                [*command, str(_MEGABYTES + _TIMES_FILE * megabytes)],
+                stdin=subprocess.DEVNULL, capture_output=True, check=False, cwd=folder,
+                timeout=_SECONDS + _SECONDS_PER_MEGABYTE * megabytes,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            raise ValueError("its library does not come to an end") from None
+        if done.returncode or not out.is_file():
+            lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
+            raise ValueError(lines[-1] if lines else f"its library ended with code {done.returncode}")
+        with np.load(out) as data:
+            up = str(data["up"]).lstrip("+")
+            labels = [str(label) for label in data["labels"]]
+            return _Markers(data["points"], data["residuals"], labels, float(data["rate_hz"]), str(data["unit"]), up)
 
 
-def _word(point: Any, key: str) -> str:
-    values = list(point[key]["value"]) if key in point else []
-    return str(values[0]).strip() if values else ""
-
-
-def _up(point: Any) -> str:
-    """The axis that points up on the screen, or z where the file does not say."""
-    axis = _word(point, "Y_SCREEN").lower().lstrip("+")
-    return axis if axis in ("x", "y", "z", "-x", "-y", "-z") else "z"
+def _is_missing(module: str) -> bool:
+    try:
+        return find_spec(module) is None
+    except ValueError:
+        # What was taken out of the list of modules has no description.
+        return True

@@ -1,7 +1,5 @@
 """PX4 ULog, by pyulog: local positions and headings, in metres north, east and down and microseconds since boot."""
 
-import contextlib
-import io
 from pathlib import Path
 from typing import Any
 
@@ -38,9 +36,7 @@ def read_ulog(path: Path, options: ReadOptions, warn: Warn) -> Log:
     Its clock is that of the samples since boot; the Unix time of boot is the median over the GPS records.
     """
     pyulog = library("pyulog", path, WHAT)
-    printed = io.StringIO()
-    # The library prints what it thinks of a damaged file.
-    with foreign(path, WHAT), contextlib.redirect_stdout(printed):
+    with foreign(path, WHAT):
         log = pyulog.ULog(str(path), [*POSITIONS, _ATTITUDE, *_GPS])
         if log.file_corruption:
             warn(f"{path} is {WHAT} with damaged parts, which were left out")
