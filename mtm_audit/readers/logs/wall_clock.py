@@ -13,7 +13,7 @@ _DATE = re.compile(
 
 
 def captured_at(text: str, where: str, warn: Warn) -> RecordedAt | None:
-    """The instant that `text` names on the clock of this machine's zone, which `warn` is told; None for none that is understood."""
+    """The instant that `text` names on the clock of this machine's zone, which `warn` is told; None for none."""
     found = _DATE.match(text.strip())
     half = "" if found is None else re.sub(r"[\s.]", "", found["rest"]).lower()
     if found is None or half not in ("", "am", "pm"):
