@@ -234,20 +234,24 @@ def write_rosbag2(folder, *poses, kind=ODOMETRY, mcap=False, stamped=True):
 def _fill(writer, store, poses, kind, serialize, *, stamped):
     make = RosMessages(store)
     topic = {"tf2_msgs/msg/TFMessage": "tf", "nav_msgs/msg/Path": "path"}.get(kind, "odom")
-    for pose in poses:
-        name = "/tf" if topic == "tf" else f"/{pose.name}/{topic}"
-        connection = writer.add_connection(name, kind, typestore=store)
-        if topic == "path":
+    names = ["/tf" if topic == "tf" else f"/{pose.name}/{topic}" for pose in poses]
+    connections = {name: writer.add_connection(name, kind, typestore=store) for name in dict.fromkeys(names)}
+    if topic == "path":
+        for name, pose in zip(names, poses, strict=True):
             kept = [make.make("geometry_msgs/msg/PoseStamped", nanoseconds(t), p, q) for t, p, q in pose.rows()]
             for count in (len(kept) // 2, len(kept)):
                 message = make.of(kind, header=make.header(0), poses=kept[:count])
-                at_ns = nanoseconds(pose.times_s[count - 1])
-                writer.write(connection, at_ns, serialize(message, kind))
-            continue
-        for index, (time_s, place, turn) in enumerate(pose.rows()):
-            stamp_ns = nanoseconds(time_s)
-            message = make.make(kind, stamp_ns if stamped else 0, place, turn)
-            writer.write(connection, stamp_ns + (late_ns(index) if stamped else 0), serialize(message, kind))
+                writer.write(connections[name], nanoseconds(pose.times_s[count - 1]), serialize(message, kind))
+        return
+    # In the order of time, as a recorder does.
+    rows = [
+        (row, name, index) for name, pose in zip(names, poses, strict=True) for index, row in enumerate(pose.rows())
+    ]
+    for (time_s, place, turn), name, index in sorted(rows, key=lambda item: item[0][0]):
+        stamp_ns = nanoseconds(time_s)
+        message = make.make(kind, stamp_ns if stamped else 0, place, turn)
+        arrival_ns = stamp_ns + (late_ns(index) if stamped else 0)
+        writer.write(connections[name], arrival_ns, serialize(message, kind))
 
 
 def write_foxglove(folder, pose, encoding="protobuf"):
