@@ -8,11 +8,14 @@ import os
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mtm_audit.commands.errors import reported
+
+if TYPE_CHECKING:
+    from mtm_audit.readers.logs.options import ReadOptions
 
 app = typer.Typer(
     help="Find out what a robot said with its motion: from a recording and a key to a verdict.",
@@ -23,6 +26,23 @@ _TRACKER_HELP = (
     "How to find robots in a video: aruco, colour:NAME,..., brightness:X0,Y0,X1,Y1, arms:INNER,OUTER, football or "
     "flow:X0,Y0,X1,Y1 (pixels from the upper left corner)."
 )
+
+
+# How to read a log; what they mean is in docs/formats.md.
+_Topics = Annotated[
+    list[str] | None,
+    typer.Option("--topic", metavar="NAME", help="What to read of a log that holds several poses; may be repeated."),
+]
+_Bodies = Annotated[
+    list[str] | None,
+    typer.Option("--body", metavar="NAME=MARKER,...", help="The markers of a rigid body; may be repeated."),
+]
+_Unit = Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of a log's positions: m, cm, mm, in or ft.")]
+_TimeUnit = Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of a log's times: s, ms, us or ns.")]
+_Up = Annotated[str | None, typer.Option(metavar="AXIS", help="Axis of a log that points up: z, y, -y and so on.")]
+_ArrivalTimes = Annotated[
+    bool, typer.Option("--arrival-times", help="Take when messages were recorded, not the times that they carry.")
+]
 
 
 class StrategyName(StrEnum):
@@ -53,7 +73,7 @@ def _every_command(
 @app.command()
 def decode(
     paths: Annotated[
-        list[Path], typer.Argument(metavar="PATH", help="A video, motion-capture files, or a folder of those.")
+        list[Path], typer.Argument(metavar="PATH", help="A video, logs or motion-capture files, or a folder of those.")
     ],
     key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
     onset: Annotated[
@@ -90,6 +110,12 @@ def decode(
     at_error: Annotated[
         float, typer.Option(min=0.0, max=60.0, metavar="SECONDS", help="How far that time may be off.")
     ] = 30.0,
+    topic: _Topics = None,
+    body: _Bodies = None,
+    unit: _Unit = None,
+    time_unit: _TimeUnit = None,
+    up: _Up = None,
+    arrival_times: _ArrivalTimes = False,
 ) -> None:
     """Decode the message in a recording.
 
@@ -108,14 +134,20 @@ def decode(
             detector=detector, onset_s=onset_s, decoys=decoys, threshold=threshold, assignment=pairs, profile=known,
             at=recorded,
         )  # fmt: skip
-        code = run_decode(DecodeOptions(tuple(paths), key, tracker, settings, as_json, plot, explain))
+        reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        code = run_decode(
+            DecodeOptions(
+                paths=tuple(paths), key=key, tracker=tracker, settings=settings, as_json=as_json, plot=plot,
+                explain=explain, reading=reading,
+            )
+        )  # fmt: skip
     raise typer.Exit(code)
 
 
 @app.command("profile")
 def learn_profile(
     paths: Annotated[
-        list[Path], typer.Argument(metavar="PATH", help="A video, motion-capture files, or a folder of those.")
+        list[Path], typer.Argument(metavar="PATH", help="A video, logs or motion-capture files, or a folder of those.")
     ],
     key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
     out: Annotated[Path, typer.Option(metavar="FILE.profile", help="Where to write what was learnt.")],
@@ -126,6 +158,12 @@ def learn_profile(
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
+    topic: _Topics = None,
+    body: _Bodies = None,
+    unit: _Unit = None,
+    time_unit: _TimeUnit = None,
+    up: _Up = None,
+    arrival_times: _ArrivalTimes = False,
 ) -> None:
     """Learn how a type of robot follows commands from a recording that decodes, for shorter ones of it.
 
@@ -137,7 +175,8 @@ def learn_profile(
         from mtm_audit.decoding.settings import DecodeSettings
 
         settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
-        run_profile(ProfileOptions(tuple(paths), key, out, tracker, settings))
+        reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        run_profile(ProfileOptions(tuple(paths), key, out, tracker, settings, reading))
 
 
 @app.command("journal")
@@ -258,6 +297,23 @@ def _pairs(texts: Sequence[str]) -> dict[str, str]:
             raise typer.BadParameter(f"{body!r} is given two tracks; give it one", param_hint="--assign")
         pairs[body] = track
     return pairs
+
+
+def _reading(
+    topics: Sequence[str] | None,
+    bodies: Sequence[str] | None,
+    unit: str | None,
+    time_unit: str | None,
+    up: str | None,
+    *,
+    arrival_times: bool,
+) -> "ReadOptions":
+    from mtm_audit.readers.logs.options import ReadOptions, marker_groups
+
+    return ReadOptions(
+        unit=unit, time_unit=time_unit, up=up, topics=tuple(topics or ()), bodies=marker_groups(bodies or ()),
+        arrival_times=arrival_times,
+    )  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -1,7 +1,7 @@
 """`mtm-audit decode`: from files to a verdict, and everything that a person or a program sees of it."""
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rich.console import Console
@@ -14,6 +14,7 @@ from mtm_audit.detectors import make_detector
 from mtm_audit.ingest.recording import read_recording, recording_files
 from mtm_audit.model.recording import Recording
 from mtm_audit.model.stage import StageError, stage
+from mtm_audit.readers.logs.options import ReadOptions
 from mtm_audit.readers.video import inspect_video
 from mtm_audit.reporting.json_report import json_report
 from mtm_audit.reporting.remarks import remarks
@@ -26,9 +27,9 @@ _PIPE_COLUMNS = 140
 EXIT_CODES = {"decoded": 0, "absent": 3, "inconclusive": 4}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DecodeOptions:
-    """What the command line asked for; `plot` None draws nothing."""
+    """What the command line asked for; `plot` None draws nothing, `reading` is how to read logs."""
 
     paths: tuple[Path, ...]
     key: Path
@@ -37,6 +38,7 @@ class DecodeOptions:
     as_json: bool
     plot: Path | None
     explain: bool
+    reading: ReadOptions = field(default_factory=ReadOptions)
 
 
 def run_decode(options: DecodeOptions) -> int:
@@ -74,13 +76,17 @@ def _decode(options: DecodeOptions, stages: list[Stage]) -> tuple[Recording, Dec
     stages.append(Stage("key", (f"{key.id}, scheme {key.scheme.name} (fingerprint {key.scheme.fingerprint})",)))
     with _progress() as progress:
         with stage("recording"):
-            files, kind = recording_files(options.paths)
+            left_out: list[str] = []
+            files, kind = recording_files(options.paths, left_out.append)
             frames = inspect_video(files[0]).frame_count if kind == "video" else None
         if kind == "video":
             stages.append(Stage("recording", (f"video {files[0]}, {frames or 'an unknown number of'} frames",)))
         task = progress.add_task(f"tracking {files[0].name}", total=frames, visible=kind == "video")
         with stage("tracks" if kind == "video" else "recording"):
-            recording = read_recording(files, kind, options.tracker, lambda done: progress.update(task, completed=done))
+            recording = read_recording(
+                files, kind, options.tracker, lambda done: progress.update(task, completed=done), options.reading
+            )
+            recording = replace(recording, warnings=(*left_out, *recording.warnings))
         progress.remove_task(task)
         stages[1:] = stages_of_recording(recording)
         return recording, _read(recording, key, options.settings, progress)

@@ -8,6 +8,7 @@ from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.ingest.recording import read_recording, recording_files
+from mtm_audit.readers.logs.options import ReadOptions
 from mtm_onboard.protocol.key import Key, load_key
 
 
@@ -17,10 +18,12 @@ def decode(
     *,
     tracker: str = "aruco",
     settings: DecodeSettings | None = None,
+    reading: ReadOptions | None = None,
 ) -> Decoding:
-    """The decoding of one recording: a video, motion-capture files, or a folder of them.
+    """The decoding of one recording: a video, logs or motion-capture files, or a folder of them.
 
-    `key` is a key or its file; `tracker` is asked of videos alone, as `mtm-audit decode --tracker`. A recording that
+    `key` is a key or its file; `tracker` is asked of videos alone, as `mtm-audit decode --tracker`, and
+    `reading` of logs. A recording that
     says when it was made is believed unless `settings.at` says otherwise. Raises MtmError, with one sentence that says
     what to do, when a file cannot be used or nothing in it can be read.
     """
@@ -28,5 +31,5 @@ def decode(
     opened = key if isinstance(key, Key) else load_key(Path(key))
     asked = DecodeSettings() if settings is None else settings
     files, kind = recording_files([Path(path) for path in named])
-    recording = read_recording(files, kind, tracker)
+    recording = read_recording(files, kind, tracker, options=reading)
     return decode_tracks(recording.tracks, opened, asked if asked.at is not None else replace(asked, at=recording.at))

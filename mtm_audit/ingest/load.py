@@ -4,7 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mtm_audit.model.track import Track
-from mtm_audit.readers.motion_capture import read_motion_capture
+from mtm_audit.readers.logs.opening import opening_of
+from mtm_audit.readers.logs.registry import check_foreign, format_of, read_log
 from mtm_audit.readers.text import check_readable
 from mtm_audit.readers.video import read_frames
 from mtm_audit.tracking.registry import tracker
@@ -13,16 +14,18 @@ VIDEO_SUFFIXES = frozenset({".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".m
 
 
 def is_video(path: Path) -> bool:
-    """By its suffix, or else by its content: text is motion capture, anything else is video.
+    """By its suffix, or else by its content: what is neither text nor a known log is video.
 
-    Raises MtmError when the file is missing, empty or a folder.
+    Raises MtmError when the file is missing, empty or a folder, or of a format that is known not to be read.
     """
     check_readable(path)
     if path.suffix.lower() in VIDEO_SUFFIXES:
         return True
-    with path.open("rb") as file:
-        start = file.read(4096)
-    return b"\0" in start
+    opening = opening_of(path)
+    if opening.is_text or format_of(opening) is not None:
+        return False
+    check_foreign(opening)
+    return True
 
 
 def load_tracks(
@@ -31,12 +34,12 @@ def load_tracks(
     warn: Callable[[str], None] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> list[Track]:
-    """Read one recording: a video through the named tracker, or a motion-capture file as it is.
+    """Read one recording: a video through the named tracker, or a log or motion-capture file as it is.
 
     `warn` receives one sentence for each thing that is wrong but leaves something to use; `progress` the number of
     frames tracked so far. Raises MtmError when the recording cannot be used.
     """
     if not is_video(path):
-        return [read_motion_capture(path)]
+        return list(read_log(path, warn=warn).tracks)
     chosen = tracker(tracker_name)
     return chosen.track(read_frames(path, chosen.pixels, warn), progress)

@@ -14,7 +14,7 @@ from hil.experiments.detectors.paper_figures import MARGINS
 from hil.fleet.lockstep import run_lockstep
 from hil.fleet.programs import program
 from hil.sensors.cameras import CAMERAS
-from mtm_audit.readers.motion_capture import read_tum
+from mtm_audit.readers.logs.registry import read_log
 from mtm_audit.readers.video import read_frames
 from mtm_onboard.cli import main as onboard
 from mtm_onboard.protocol import load_key
@@ -39,7 +39,7 @@ def test_a_recording_has_motion_capture_the_truth_and_the_key(tmp_path, capsys):
     key = load_key(tmp_path / "a" / "robot.key")
     assert truth["scheme_fingerprint"] == key.scheme.fingerprint
     assert key.secret.hex() not in (tmp_path / "a" / "truth.json").read_text()
-    assert len(read_tum(tmp_path / "a" / "mocap" / "robot3.tum").times_s) == 201
+    assert len(read_log(tmp_path / "a" / "mocap" / "robot3.tum").tracks[0].times_s) == 201
     assert sorted(path.name for path in (tmp_path / "a").iterdir()) == ["mocap", "robot.key", "truth.json"]
 
 
