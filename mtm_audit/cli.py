@@ -53,7 +53,8 @@ def _every_command(
 @app.command()
 def decode(
     paths: Annotated[
-        list[Path], typer.Argument(metavar="PATH", help="A video, motion-capture files, or a folder of those.")
+        list[Path],
+        typer.Argument(metavar="PATH", help="Videos, motion-capture files, or a folder of those or of pictures."),
     ],
     key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
     onset: Annotated[
@@ -63,6 +64,17 @@ def decode(
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
+    frame_rate: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Pictures a second that the camera took, whatever the file says."),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(metavar="N", help="Play it N times as fast: 4 for slow motion of 120 shown at 30 a second."),
+    ] = None,
+    search_speed: Annotated[
+        bool, typer.Option("--search-speed", help="Try common speeds from 1/8 to 8, which costs 3.9 bits.")
+    ] = False,
     detector: Annotated[
         str, typer.Option(metavar="NAME", help="How to look for the noise: matched, or coherency as the paper does.")
     ] = "matched",
@@ -95,6 +107,8 @@ def decode(
 
     Exit codes: 0 decoded, 3 no message of this key, 4 inconclusive, 1 error, 2 usage, 130 interrupted.
     """  # fmt: skip
+    if search_speed and speed is not None:
+        raise typer.BadParameter("is given; leave it or --search-speed out", param_hint="--speed")
     onset_s, pairs, at_unix_s = _onset_s(onset), _pairs(assign or []), _unix_s(at)
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.decode import DecodeOptions, run_decode
@@ -108,7 +122,10 @@ def decode(
             detector=detector, onset_s=onset_s, decoys=decoys, threshold=threshold, assignment=pairs, profile=known,
             at=recorded,
         )  # fmt: skip
-        code = run_decode(DecodeOptions(tuple(paths), key, tracker, settings, as_json, plot, explain))
+        played = None if search_speed else 1.0 if speed is None else speed
+        code = run_decode(
+            DecodeOptions(tuple(paths), key, tracker, settings, as_json, plot, explain, frame_rate, played)
+        )
     raise typer.Exit(code)
 
 

@@ -19,6 +19,7 @@ def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
             "either nobody sent a message, or it was sent with another key, or the recording is too short or too "
             "coarse to show it",
             *_of_the_nearly_found(decoding),
+            *_of_the_speed(recording),
         )
     if decoding.scheme.framing is not None:
         return (_of_the_frame(decoding),)
@@ -34,6 +35,16 @@ def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
             f"{(1 << payload_bits(decoding.scheme)) - 1}; the robot was perhaps given symbols instead of a number",
         )
     return tuple(_of_the_uncertain(recording, decoding))
+
+
+def _of_the_speed(recording: Recording) -> tuple[str, ...]:
+    """A film does not show by itself that it was slowed down."""
+    if recording.kind != "video" or recording.speed_searched or recording.speed != 1.0:
+        return ()
+    return (
+        "slow motion, time lapse and a wrong frame rate look like this too: give --speed or --frame-rate when they are "
+        "known, or let --search-speed try common ones",
+    )
 
 
 def _of_the_nearly_found(decoding: Decoding) -> tuple[str, ...]:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from mtm_audit.model.playback import Playback
 from mtm_onboard.protocol.errors import MtmError
 
 if TYPE_CHECKING:
@@ -100,9 +99,11 @@ class OrderClock:
 
 
 class EvenClock:
-    """So many pictures a second from zero on, whatever the file says."""
+    """So many pictures a second from zero on, whatever the file says; raises MtmError when that is no rate."""
 
     def __init__(self, rate_hz: float) -> None:
+        if not (math.isfinite(rate_hz) and rate_hz > 0.0):
+            raise MtmError(f"a film of {rate_hz} pictures a second cannot be; give a number above zero")
         self._rate_hz = rate_hz
         self._count = 0
 
@@ -116,14 +117,18 @@ class EvenClock:
 
 
 def clock_of(
-    path: Path, container: "InputContainer", stream: "VideoStream", playback: Playback, warn: Callable[[str], None]
+    path: Path,
+    container: "InputContainer",
+    stream: "VideoStream",
+    frame_rate_hz: float | None,
+    warn: Callable[[str], None],
 ) -> Clock:
-    """The clock for a file; where times are assumed `warn` is told.
+    """The clock for a file, even at `frame_rate_hz` unless that is None; where times are assumed `warn` is told.
 
     Raises MtmError when nothing says how many pictures a second a stream without times has.
     """
-    if playback.frame_rate_hz is not None:
-        return EvenClock(playback.frame_rate_hz)
+    if frame_rate_hz is not None:
+        return EvenClock(frame_rate_hz)
     if container.format.name == "avi":
         return OrderClock(stream.codec_context.reorder_depth)
     if container.format.name not in _WITHOUT_TIMES:

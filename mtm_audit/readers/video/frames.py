@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mtm_audit.model.picture import Frame, Pixels
-from mtm_audit.model.playback import Playback
 from mtm_audit.readers.video.clock import Clock, clock_of
 from mtm_audit.readers.video.header import announced_duration_s
 from mtm_audit.readers.video.opened import opened_video
@@ -37,9 +36,11 @@ def read_frames(
     path: Path,
     pixels: Pixels = "gray",
     warn: Callable[[str], None] | None = None,
-    playback: Playback | None = None,
+    frame_rate_hz: float | None = None,
 ) -> Iterator[Frame]:
     """Decode a video lazily, in order of presentation and turned as players turn it, with the time stamps of the file.
+
+    `frame_rate_hz` replaces those by even ones.
 
     A file that breaks off or turns corrupt yields the frames before the break, then calls `warn` with one sentence.
     What the container leaves out on purpose is no damage. Frames without a time that comes after the one before are
@@ -48,22 +49,21 @@ def read_frames(
     can be decoded.
     """
     say = warn or (lambda sentence: None)
-    asked = playback or Playback()
     decoded = untimed = 0
     last_s = -math.inf
     progress = _Progress()
     orientation: Orientation | None = None
     with opened_video(path) as (container, stream):
-        clock = clock_of(path, container, stream, asked, say)
+        clock = clock_of(path, container, stream, frame_rate_hz, say)
         for picture in _pictures(container, stream, clock, progress):
             if orientation is None:
                 orientation = _orientation(path, picture, say)
             decoded += 1
             time_s = clock.time_s(picture)
-            if time_s is None or time_s / asked.speed <= last_s:
+            if time_s is None or time_s <= last_s:
                 untimed += 1
                 continue
-            last_s = time_s / asked.speed
+            last_s = time_s
             yield Frame(last_s, orientation.shown(image_of(picture, pixels)))
         if progress.damage is None:
             progress.damage = _missing_end(container, stream, progress.end_s)

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from mtm_audit.model.playback import Playback
 from mtm_audit.readers.video import read_frames
 from mtm_onboard.protocol import MtmError
 from tests.audit.readers.video.films import Encoding, pictures, remux, write_film
@@ -94,23 +93,20 @@ def test_a_bare_stream_without_a_rate_needs_one(tmp_path):
     )
     with pytest.raises(MtmError, match="--frame-rate"):
         read(film)
-    times_s, _, warnings = read(film, playback=Playback(frame_rate_hz=15.0))
+    times_s, _, warnings = read(film, frame_rate_hz=15.0)
     assert times_s == pytest.approx(np.arange(30) / 15)
     assert not warnings
 
 
-def test_a_given_rate_or_speed_replaces_the_times_of_the_file(tmp_path):
+def test_a_given_rate_replaces_the_times_of_the_file(tmp_path):
     film = write_film(tmp_path / "film.mp4", pictures(30))
-    assert read(film, playback=Playback(frame_rate_hz=120.0))[0] == pytest.approx(np.arange(30) / 120)
-    assert read(film, playback=Playback(speed=4.0))[0] == pytest.approx(np.arange(30) / 120)
+    assert read(film, frame_rate_hz=120.0)[0] == pytest.approx(np.arange(30) / 120)
 
 
-@pytest.mark.parametrize(
-    "asked", [{"speed": 0.0}, {"speed": np.nan}, {"frame_rate_hz": -1.0}, {"frame_rate_hz": np.inf}]
-)
-def test_no_film_has_such_a_speed(asked):
+@pytest.mark.parametrize("rate_hz", [0.0, -1.0, np.inf, np.nan])
+def test_no_film_has_such_a_rate(tmp_path, rate_hz):
     with pytest.raises(MtmError, match="above zero"):
-        Playback(**asked)
+        read(write_film(tmp_path / "film.mp4", pictures(3)), frame_rate_hz=rate_hz)
 
 
 def test_a_transport_stream_keeps_the_clock_of_its_sender(tmp_path):
