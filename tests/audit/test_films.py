@@ -123,9 +123,10 @@ def test_speed_and_search_exclude_each_other(audit, slow):
 def test_two_frames_a_second_are_too_few_in_one_sentence(audit, folder, tmp_path):
     for every in (15, 30, 60):
         film = transcode(folder / "film.mp4", tmp_path / f"film{every}.mkv", H264, every=every)
-        code, out, _ = audit(film)
-        assert code == 3
-        assert f"{30 / every:.1f} observations a second are too few" in out
+        code, out, err = audit(film)
+        assert (code, out) == (1, "")
+        assert f"{30 / every:.2g} times a second, which is too seldom for a band up to 5 Hz" in err
+        assert err.count("\n") == 1
 
 
 def test_a_date_means_the_first_frame_whatever_its_stamp(tmp_path, capsys):
