@@ -15,7 +15,7 @@ from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.decoding.speeds import at_speed, check_speed, decode_at_speeds, played
 from mtm_audit.detectors import make_detector
-from mtm_audit.ingest.films import film_length
+from mtm_audit.ingest.films import film_compression, film_length
 from mtm_audit.ingest.recording import read_recording
 from mtm_audit.ingest.source import Source, sources_of
 from mtm_audit.model.recording import Recording
@@ -131,7 +131,10 @@ def _decode(options: DecodeOptions, key: Key, source: Source, stages: list[Stage
 
 
 def _read(recording: Recording, key: Key, options: DecodeOptions, progress: Progress) -> tuple[Recording, Decoding]:
-    """The decoding, and the recording at the speed at which it was decoded."""
+    """The decoding, and the recording at the speed at which it was decoded; of a film with its compression.
+
+    That is what may have kept the message from being read, so it is not looked at when it was.
+    """
     task = progress.add_task("reading", total=1.0)
 
     def show(stage: str, fraction: float) -> None:
@@ -146,8 +149,15 @@ def _read(recording: Recording, key: Key, options: DecodeOptions, progress: Prog
     else:
         speed = options.speed
         decoding = decode_tracks(played(tracks, speed), key, at_speed(timed, tracks, speed), show)
-    searched = options.speed is None
-    return replace(recording, tracks=played(tracks, speed), speed=speed, speed_searched=searched), decoding
+    lost = recording.kind == "video" and decoding.verdict != "decoded"
+    shown = replace(
+        recording,
+        tracks=played(tracks, speed),
+        speed=speed,
+        speed_searched=options.speed is None,
+        compression=film_compression(recording.paths) if lost else None,
+    )
+    return shown, decoding
 
 
 def _publish(options: DecodeOptions, recording: Recording, decoding: Decoding) -> str:

@@ -3,9 +3,11 @@
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from mtm_audit.model.compression import Compression
 from mtm_audit.model.picture import Frame, Pixels
 from mtm_audit.readers.picture_folder import PICTURE_SUFFIXES, pictures_in, read_pictures
 from mtm_audit.readers.video import inspect_video, read_frames
+from mtm_audit.readers.video.compression import read_compression
 
 Warn = Callable[[str], None]
 
@@ -37,6 +39,11 @@ def film_length(files: Sequence[Path]) -> int | None:
         return len(pictures)
     counts = [inspect_video(file).frame_count for file in files]
     return None if None in counts else sum(count for count in counts if count is not None)
+
+
+def film_compression(files: Sequence[Path]) -> Compression | None:
+    """How coarsely a film is coded, by its first file; None for pictures, which say nothing of it."""
+    return None if _pictures(files) else read_compression(files[0])
 
 
 def is_picture(path: Path) -> bool:

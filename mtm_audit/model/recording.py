@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from mtm_audit.model.compression import Compression
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.track import Track
 
@@ -17,7 +18,8 @@ class Recording:
     """What was recorded: the files, their tracks, and one sentence for each thing that was wrong but usable.
 
     `at` is when the files say that they were recorded, None when they do not. `speed` is how many times as fast as the
-    files say it is played here, which was given, or found among others when `speed_searched`.
+    files say it is played here, which was given, or found among others when `speed_searched`. `compression` is that of
+    a film, where it was asked for.
     """
 
     paths: tuple[Path, ...]
@@ -27,6 +29,7 @@ class Recording:
     at: RecordedAt | None = None
     speed: float = 1.0
     speed_searched: bool = False
+    compression: Compression | None = None
 
     def begun_at(self, begun: RecordedAt) -> RecordedAt:
         """When the recording's own clock stood at zero, if its first observation was made at `begun.unix_s`."""

@@ -5,6 +5,7 @@ import math
 from mtm_audit.decoding.decode import MORE_DECOYS, NEARLY
 from mtm_audit.decoding.decoding import CERTAIN, Decoding
 from mtm_audit.model.recording import Recording
+from mtm_audit.reporting.film_limits import film_limits
 from mtm_onboard.protocol.framing import payload_bits
 
 _LONGEST_FACTOR = 10.0
@@ -14,6 +15,10 @@ def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
     """Sentences for a decode that is not "decoded": what is uncertain and what to try; nothing otherwise."""
     if decoding.verdict == "decoded":
         return ()
+    return (*_of_the_verdict(recording, decoding), *film_limits(recording, decoding.scheme))
+
+
+def _of_the_verdict(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
     if decoding.verdict == "absent":
         return (
             "either nobody sent a message, or it was sent with another key, or the recording is too short or too "

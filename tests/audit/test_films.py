@@ -82,6 +82,8 @@ def test_slow_motion_is_absent_with_the_possibility_named(audit, slow):
     assert code == 3
     assert "--search-speed" in out
     assert "slow motion" in out
+    assert "the film is H.264 at" in " ".join(out.split())
+    assert "quantiser" in out
 
 
 def test_slow_motion_of_a_known_speed_is_decoded(audit, slow, whole):

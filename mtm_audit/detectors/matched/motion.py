@@ -41,8 +41,8 @@ def uniform_motion(glimpse: Glimpse, highest_hz: float) -> Motion:
     usual_s = float(np.median(glimpse.durations_s))
     if usual_s * highest_hz > _MOST_PERIODS:
         raise MtmError(
-            f"track {glimpse.name!r} was observed {1.0 / usual_s:.2g} times a second, which is too seldom for a band up "
-            f"to {highest_hz:g} Hz; record with {2.0 * highest_hz:g} a second or more"
+            f"track {glimpse.name!r} was observed {1.0 / usual_s:.2g} times a second, which is too seldom for a band "
+            f"up to {highest_hz:g} Hz; record with {2.0 * highest_hz:g} a second or more"
         )
     step_s = max(usual_s, 1.0 / (_CELLS_PER_PERIOD * highest_hz))
     steps = glimpse.velocities * glimpse.durations_s[:, None]
