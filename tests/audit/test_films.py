@@ -117,6 +117,13 @@ def test_a_searched_speed_is_found_and_paid_for(audit, folder, tmp_path, speed, 
     assert len(SPEEDS) == 15
 
 
+def test_a_coarse_film_without_a_message_stays_absent(audit, tmp_path):
+    # What an encoder leaves of noise is red: most of it lies below 1 Hz, and some of it repeats.
+    film = film_robots(tmp_path / "film.mp4", crf=30, symbols=None)
+    assert audit(film)[0] == 3
+    assert audit(film, "--search-speed")[0] == 3
+
+
 def test_speed_and_search_exclude_each_other(audit, slow):
     assert audit(slow, "--speed", "4", "--search-speed")[0] == 2
     assert audit(slow, "--speed", "-1")[0] == 1

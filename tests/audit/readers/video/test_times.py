@@ -1,3 +1,5 @@
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -125,3 +127,19 @@ def test_a_capture_that_begins_between_key_frames_is_read(tmp_path):
     times_s, _, _ = read(late)
     assert len(times_s) == 60
     assert np.diff(times_s) == pytest.approx(1 / 30, abs=1e-4)
+
+
+def test_an_mp4_whose_first_time_was_cut_keeps_its_steps(tmp_path):
+    # Muxers write the start in whole milliseconds unless they are told otherwise.
+    stamps = [33.9, *(33.9 + 1000 / 30 * number for number in range(1, 60))]
+    encoding = Encoding(rate_hz=90_000)
+    ticks = [round(90 * stamp) for stamp in stamps]
+
+    def finely(_, stream):
+        stream.codec_context.time_base = stream.time_base = Fraction(1, 90_000)
+
+    film = write_film(tmp_path / "film.mp4", pictures(60), encoding, stamps=ticks, prepare=finely)
+    times_s, _, warnings = read(film)
+    assert 0.033 - 1e-6 <= times_s[0] <= 0.034
+    assert times_s - times_s[0] == pytest.approx((np.array(ticks) - ticks[0]) / 90_000, abs=2e-5)
+    assert not warnings
