@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from hil.commands.codecs_cli import codecs
 from hil.commands.experiments_cli import EXPERIMENTS
 from hil.commands.options import (
     KeyFile,
@@ -44,6 +45,15 @@ class CameraName(StrEnum):
     PHONE = "phone"
 
 
+class QualityName(StrEnum):
+    """Keys of `hil.sensors.film_qualities.FILM_QUALITIES`, repeated so that --help need not load OpenCV."""
+
+    PHONE = "phone"
+    ACTION_CAMERA = "action-camera"
+    SURVEILLANCE = "surveillance"
+    MESSENGER = "messenger"
+
+
 @app.callback()
 def _every_command() -> None:
     pass
@@ -60,6 +70,9 @@ def record(
     wire: Annotated[WireName, typer.Option(help="CAN, plaintext or MAVLink protocol, or no wire.")] = WireName.CAN,
     seed: WorldSeed = 0,
     camera: Annotated[CameraName, typer.Option(help="Which camera films.")] = CameraName.OVERHEAD,
+    quality: Annotated[
+        QualityName | None, typer.Option(help="Encode the film as these do; nearly lossless without.")
+    ] = None,
     no_video: Annotated[bool, typer.Option("--no-video", help="Motion capture alone.")] = False,
     realtime: Annotated[
         bool, typer.Option("--realtime", help="Run the onboard programs in processes of their own, on real ports.")
@@ -82,6 +95,7 @@ def record(
                 seed=seed,
                 camera=film,
                 realtime=realtime,
+                quality=None if quality is None else quality.value,
             ),
             console,
         )
@@ -127,6 +141,7 @@ for _experiment in EXPERIMENTS:
     app.command()(_experiment)
 app.add_typer(paper, name="paper")
 app.add_typer(verdicts, name="verdicts")
+app.add_typer(codecs, name="codecs")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -73,7 +73,8 @@ def _every_command(
 @app.command()
 def decode(
     paths: Annotated[
-        list[Path], typer.Argument(metavar="PATH", help="A video, logs or motion-capture files, or a folder of those.")
+        list[Path],
+        typer.Argument(metavar="PATH", help="Videos, logs, motion-capture files, or a folder of those or of pictures."),
     ],
     key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
     onset: Annotated[
@@ -83,6 +84,17 @@ def decode(
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
+    frame_rate: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Pictures a second that the camera took, whatever the file says."),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(metavar="N", help="Play it N times as fast: 4 for slow motion of 120 shown at 30 a second."),
+    ] = None,
+    search_speed: Annotated[
+        bool, typer.Option("--search-speed", help="Try common speeds from 1/8 to 8, which costs 3.9 bits.")
+    ] = False,
     detector: Annotated[
         str, typer.Option(metavar="NAME", help="How to look for the noise: matched, or coherency as the paper does.")
     ] = "matched",
@@ -121,6 +133,8 @@ def decode(
 
     Exit codes: 0 decoded, 3 no message of this key, 4 inconclusive, 1 error, 2 usage, 130 interrupted.
     """  # fmt: skip
+    if search_speed and speed is not None:
+        raise typer.BadParameter("is given; leave it or --search-speed out", param_hint="--speed")
     onset_s, pairs, at_unix_s = _onset_s(onset), _pairs(assign or []), _unix_s(at)
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.decode import DecodeOptions, run_decode
@@ -135,10 +149,11 @@ def decode(
             at=recorded,
         )  # fmt: skip
         reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        played = None if search_speed else 1.0 if speed is None else speed
         code = run_decode(
             DecodeOptions(
                 paths=tuple(paths), key=key, tracker=tracker, settings=settings, as_json=as_json, plot=plot,
-                explain=explain, reading=reading,
+                explain=explain, reading=reading, frame_rate_hz=frame_rate, speed=played,
             )
         )  # fmt: skip
     raise typer.Exit(code)

@@ -15,6 +15,7 @@ from hil.fleet.realtime import START_S, run_realtime
 from hil.fleet.recording import Sensors, write_recording
 from hil.fleet.rig import RobotReport, RunSettings, Wire
 from hil.sensors.cameras import CAMERAS
+from hil.sensors.film_qualities import FILM_QUALITIES
 from hil.worlds.robomaster import fleet_scheme
 from mtm_onboard.protocol import generate_key, load_key, save_key
 from mtm_onboard.protocol.framing import symbols_of_number
@@ -28,7 +29,8 @@ LEAD_S = 1.5
 class RecordOptions:
     """What the command line asked for.
 
-    `message` None moves the robots without one, `key` None makes a key, `camera` None films nothing. `realtime` runs
+    `message` None moves the robots without one, `key` None makes a key, `camera` None films nothing, `quality` None
+    keeps the film nearly as the camera saw it. `realtime` runs
     the onboard programs on UARTs when `wire` is plaintext, over UDP when it is MAVLink and on serial CAN adapters
     otherwise.
     """
@@ -41,6 +43,7 @@ class RecordOptions:
     seed: int
     camera: str | None
     realtime: bool
+    quality: str | None = None
 
 
 def record(options: RecordOptions, console: Console) -> None:
@@ -48,7 +51,10 @@ def record(options: RecordOptions, console: Console) -> None:
     key = generate_key("hil", fleet_scheme()) if options.key is None else load_key(options.key)
     framed = key.scheme.framing is not None
     symbols = None if options.message is None or framed else symbols_of_number(options.message, key.scheme)
-    sensors = Sensors(camera=None if options.camera is None else CAMERAS[options.camera])
+    sensors = Sensors(
+        camera=None if options.camera is None else CAMERAS[options.camera],
+        quality=None if options.quality is None else FILM_QUALITIES[options.quality],
+    )
     settings = RunSettings(
         key=key,
         symbols=symbols,

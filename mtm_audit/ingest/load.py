@@ -10,7 +10,10 @@ from mtm_audit.readers.text import check_readable
 from mtm_audit.readers.video import read_frames
 from mtm_audit.tracking.registry import tracker
 
-VIDEO_SUFFIXES = frozenset({".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts"})
+VIDEO_SUFFIXES = frozenset(
+    {".264", ".265", ".3gp", ".avi", ".h264", ".h265", ".hevc", ".ivf", ".m2ts", ".m4v", ".mjpeg", ".mjpg", ".mkv"}
+    | {".mov", ".mp4", ".mpeg", ".mpg", ".mts", ".mxf", ".obu", ".ogv", ".ts", ".vob", ".webm", ".wmv", ".y4m"}
+)
 
 
 def is_video(path: Path) -> bool:

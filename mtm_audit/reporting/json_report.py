@@ -44,6 +44,7 @@ def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, .
             "kind": recording.kind,
             "duration_s": recording.duration_s,
             "frames": recording.frames,
+            "speed": recording.speed,
         },
         "warnings": list(warnings),
     }

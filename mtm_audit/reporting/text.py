@@ -144,7 +144,8 @@ def recording_line(recording: Recording) -> str:
     rate = "" if rate_hz is None else f" at {rate_hz:.4g} a second"
     what = "frames" if recording.kind == "video" else "samples"
     names = ", ".join(track.name for track in recording.tracks)
-    return f"{recording.kind}, {recording.duration_s:.1f} s, {recording.frames} {what}{rate}, tracks: {names}"
+    speed = "" if recording.speed == 1.0 else f", played {recording.speed:.4g} times as fast as its times say"
+    return f"{recording.kind}, {recording.duration_s:.1f} s, {recording.frames} {what}{rate}{speed}, tracks: {names}"
 
 
 def _table_of(decoding: Decoding) -> Table:
