@@ -38,5 +38,5 @@ def load_tracks(
     """
     if not is_video(path):
         return [read_motion_capture(path)]
-    chosen = tracker(tracker_name)
+    chosen = tracker(tracker_name, warn)
     return chosen.track(read_frames(path, chosen.pixels, warn), progress)
