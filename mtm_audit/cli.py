@@ -20,8 +20,8 @@ app = typer.Typer(
 )  # fmt: skip
 
 _TRACKER_HELP = (
-    "How to find robots in a video: aruco, colour:NAME,..., brightness:X0,Y0,X1,Y1, arms:INNER,OUTER, football or "
-    "flow:X0,Y0,X1,Y1 (pixels from the upper left corner)."
+    "How to find robots in a video: aruco or aruco:6x6_250, colour:NAME,..., brightness:X0,Y0,X1,Y1, "
+    "arms:INNER,OUTER, football or flow:X0,Y0,X1,Y1 (pixels from the upper left corner)."
 )
 
 
@@ -60,6 +60,12 @@ def decode(
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
     tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
+    reference: Annotated[
+        str,
+        typer.Option(
+            metavar="TRACK,...", help="Tracks that stand still, such as markers on the floor (default: found)."
+        ),
+    ] = "",
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
@@ -108,7 +114,9 @@ def decode(
             detector=detector, onset_s=onset_s, decoys=decoys, threshold=threshold, assignment=pairs, profile=known,
             at=recorded,
         )  # fmt: skip
-        code = run_decode(DecodeOptions(tuple(paths), key, tracker, settings, as_json, plot, explain))
+        code = run_decode(
+            DecodeOptions(tuple(paths), key, tracker, _names(reference), settings, as_json, plot, explain)
+        )
     raise typer.Exit(code)
 
 
@@ -123,6 +131,12 @@ def learn_profile(
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
     tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
+    reference: Annotated[
+        str,
+        typer.Option(
+            metavar="TRACK,...", help="Tracks that stand still, such as markers on the floor (default: found)."
+        ),
+    ] = "",
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
@@ -137,7 +151,7 @@ def learn_profile(
         from mtm_audit.decoding.settings import DecodeSettings
 
         settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
-        run_profile(ProfileOptions(tuple(paths), key, out, tracker, settings))
+        run_profile(ProfileOptions(tuple(paths), key, out, tracker, _names(reference), settings))
 
 
 @app.command("journal")
@@ -246,6 +260,10 @@ def _unix_s(text: str | None) -> float | None:
             f"{text!r} is no date and time; write it like 2026-01-31T12:00:00Z", param_hint="--at"
         ) from None
     return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def _pairs(texts: Sequence[str]) -> dict[str, str]:

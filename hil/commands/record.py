@@ -1,7 +1,7 @@
 """`mtm-hil record`: drive the simulated robots and record them."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -14,7 +14,8 @@ from hil.fleet.lockstep import run_lockstep
 from hil.fleet.realtime import START_S, run_realtime
 from hil.fleet.recording import Sensors, write_recording
 from hil.fleet.rig import RobotReport, RunSettings, Wire
-from hil.sensors.cameras import CAMERAS
+from hil.sensors.camera_motion import CameraMotion
+from hil.sensors.cameras import CAMERAS, FLOORS
 from hil.worlds.robomaster import fleet_scheme
 from mtm_onboard.protocol import generate_key, load_key, save_key
 from mtm_onboard.protocol.framing import symbols_of_number
@@ -30,7 +31,7 @@ class RecordOptions:
 
     `message` None moves the robots without one, `key` None makes a key, `camera` None films nothing. `realtime` runs
     the onboard programs on UARTs when `wire` is plaintext, over UDP when it is MAVLink and on serial CAN adapters
-    otherwise.
+    otherwise. `motion` None is a camera on a stand; `floor` is one of `FLOORS`.
     """
 
     out: Path
@@ -41,6 +42,8 @@ class RecordOptions:
     seed: int
     camera: str | None
     realtime: bool
+    motion: CameraMotion | None = None
+    floor: str = "mat"
 
 
 def record(options: RecordOptions, console: Console) -> None:
@@ -48,7 +51,10 @@ def record(options: RecordOptions, console: Console) -> None:
     key = generate_key("hil", fleet_scheme()) if options.key is None else load_key(options.key)
     framed = key.scheme.framing is not None
     symbols = None if options.message is None or framed else symbols_of_number(options.message, key.scheme)
-    sensors = Sensors(camera=None if options.camera is None else CAMERAS[options.camera])
+    sensors = Sensors(
+        camera=None if options.camera is None else replace(CAMERAS[options.camera], motion=options.motion),
+        scene=FLOORS[options.floor],
+    )
     settings = RunSettings(
         key=key,
         symbols=symbols,

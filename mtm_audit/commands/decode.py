@@ -33,6 +33,7 @@ class DecodeOptions:
     paths: tuple[Path, ...]
     key: Path
     tracker: str
+    reference: tuple[str, ...]
     settings: DecodeSettings
     as_json: bool
     plot: Path | None
@@ -80,7 +81,9 @@ def _decode(options: DecodeOptions, stages: list[Stage]) -> tuple[Recording, Dec
             stages.append(Stage("recording", (f"video {files[0]}, {frames or 'an unknown number of'} frames",)))
         task = progress.add_task(f"tracking {files[0].name}", total=frames, visible=kind == "video")
         with stage("tracks" if kind == "video" else "recording"):
-            recording = read_recording(files, kind, options.tracker, lambda done: progress.update(task, completed=done))
+            recording = read_recording(
+                files, kind, options.tracker, lambda done: progress.update(task, completed=done), options.reference
+            )
         progress.remove_task(task)
         stages[1:] = stages_of_recording(recording)
         return recording, _read(recording, key, options.settings, progress)

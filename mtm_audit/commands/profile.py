@@ -24,6 +24,7 @@ class ProfileOptions:
     key: Path
     out: Path
     tracker: str
+    reference: tuple[str, ...]
     settings: DecodeSettings
 
 
@@ -34,7 +35,7 @@ def run_profile(options: ProfileOptions) -> None:
     tracker(options.tracker)
     key = load_key(options.key)
     files, kind = recording_files(options.paths)
-    recording = read_recording(files, kind, options.tracker, lambda _: None)
+    recording = read_recording(files, kind, options.tracker, lambda _: None, options.reference)
     decoding = decode_tracks(recording.tracks, key, options.settings)
     if decoding.verdict != "decoded":
         raise MtmError(

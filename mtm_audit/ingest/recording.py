@@ -30,16 +30,21 @@ def recording_files(paths: Sequence[Path]) -> tuple[tuple[Path, ...], Kind]:
 
 
 def read_recording(
-    files: tuple[Path, ...], kind: Kind, tracker: str = "aruco", progress: Callable[[int], None] | None = None
+    files: tuple[Path, ...],
+    kind: Kind,
+    tracker: str = "aruco",
+    progress: Callable[[int], None] | None = None,
+    reference: Sequence[str] = (),
 ) -> Recording:
     """Read the files into tracks; `progress` receives the number of frames tracked so far.
 
-    Raises MtmError when one cannot be used, or when two files are of one body.
+    `reference` names tracks of a video that stand still; the camera's own motion is taken out. Raises MtmError when a
+    file cannot be used, or when two files are of one body.
     """
     warnings: list[str] = []
     tracks: list[Track] = []
     for file in files:
-        tracks += load_tracks(file, tracker, warnings.append, progress)
+        tracks += load_tracks(file, tracker, warnings.append, progress, reference)
     names = [track.name for track in tracks]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:

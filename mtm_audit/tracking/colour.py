@@ -14,6 +14,7 @@ from mtm_onboard.protocol.errors import MtmError
 
 FULL_SEARCH_EVERY = 15
 LEAST_AREA_PX = 12
+BODY_EXTENTS = 2.5  # a robot's body reaches beyond its patch, and its shadow beyond that
 
 Window = tuple[slice, slice]
 
@@ -51,7 +52,7 @@ class ColourTracker:
                 patch = patch or _patch(frame.image, cover, (slice(0, None), slice(0, None)))
                 if patch is not None:
                     column, row, area, windows[name] = patch
-                    gather.put(name, column, row)
+                    gather.put(name, column, row, extent_px=BODY_EXTENTS * float(np.sqrt(area)))
                     areas[name].append(area)
         if not gather.seen:
             raise MtmError(

@@ -17,6 +17,7 @@ SEEN_AT_LEAST = 3  # frames; what is read less often is a chance reading of some
 # so for a fifth longer.
 AT_ONCE_S, PATIENCE = 0.5, 0.2
 NEARBY_S = 1.0  # for which a marker out of sight is looked for around its last place in every frame
+BODY_SIDES = 3.0
 SIDES_PER_S = 15.0  # faster than any robot: 2.7 m/s with a marker of 18 cm
 _COPIES = "bcdefghijklmnopqrstuvwxyz"
 
@@ -75,11 +76,10 @@ class MarkerFollower:
         Of copies that show at once the one that goes farthest has that name, the next `marker<number>b` and so on.
         """
         names = self._names()
-        self._gather.seen = {
-            names[copy]: self._gather.seen[_key(copy)]
-            for copy in names
-            if len(self._gather.seen[_key(copy)]) >= SEEN_AT_LEAST
-        }
+        seen = {copy: self._gather.seen[_key(copy)] for copy in names}
+        often = {copy: name for copy, name in names.items() if len(seen[copy]) >= SEEN_AT_LEAST}
+        self._gather.seen = {name: seen[copy] for copy, name in often.items()}
+        self._gather.extents_px = {name: self._gather.extents_px[_key(copy)] for copy, name in often.items()}
         return self._gather.tracks(with_headings=True)
 
     def _nearby(self, image: Image, time_s: float) -> dict[Copy, Sighting]:
@@ -125,7 +125,9 @@ class MarkerFollower:
 
     def _note(self, copy: Copy, sighting: Sighting, time_s: float) -> None:
         column, row = sighting.centre
-        self._gather.put(_key(copy), float(column), float(row), sighting.heading_rad)
+        # A robot's body reaches beyond its marker, and its shadow beyond that.
+        extent_px = BODY_SIDES * sighting.side_px
+        self._gather.put(_key(copy), float(column), float(row), sighting.heading_rad, extent_px)
         last = self._followed.get(copy)
         is_next = last is not None and last.seen_s == self._last_s
         step = sighting.corners - last.sighting.corners if last is not None and is_next else np.zeros((4, 2))

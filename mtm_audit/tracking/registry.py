@@ -67,3 +67,8 @@ def tracker(name: str, warn: Callable[[str], None] | None = None) -> Tracker:
 
         return parse_flow(choice)
     raise MtmError(f"there is no tracker {name!r}; choose one of: {TRACKERS}")
+
+
+def is_flipped(tracker: Tracker) -> bool:
+    """Whether the tracks that it made are those of the mirrored pictures."""
+    return bool(getattr(tracker, "flipped", False))
