@@ -37,6 +37,14 @@ class WireName(StrEnum):
     DIRECT = "direct"
 
 
+class FloorName(StrEnum):
+    """Keys of `hil.sensors.cameras.FLOORS`."""
+
+    MAT = "mat"
+    CARPET = "carpet"
+    MARKERS = "markers"
+
+
 class CameraName(StrEnum):
     """Keys of `hil.sensors.cameras.CAMERAS`, repeated so that --help need not load OpenCV."""
 
@@ -73,6 +81,14 @@ def record(
     quality: Annotated[
         QualityName | None, typer.Option(help="Encode the film as these do; nearly lossless without.")
     ] = None,
+    shake_px: Annotated[
+        float, typer.Option(min=0.0, max=100.0, help="How far a hand shakes the camera, rms in pixels below 3 Hz.")
+    ] = 0.0,
+    pan_deg: Annotated[float, typer.Option(min=-60.0, max=60.0, help="How far the camera pans while it films.")] = 0.0,
+    roll_deg: Annotated[float, typer.Option(min=0.0, max=45.0, help="How far the camera rolls to and fro.")] = 0.0,
+    floor: Annotated[
+        FloorName, typer.Option(help="A faint mat, a carpet, or a mat with markers on it.")
+    ] = FloorName.MAT,
     no_video: Annotated[bool, typer.Option("--no-video", help="Motion capture alone.")] = False,
     realtime: Annotated[
         bool, typer.Option("--realtime", help="Run the onboard programs in processes of their own, on real ports.")
@@ -81,9 +97,14 @@ def record(
     """Record four simulated robots: motion capture, video, and what was sent."""
     require_message_or_none(message, no_message)
     with reported_console() as console:
+        from math import radians
+
         from hil.commands.record import RecordOptions
         from hil.commands.record import record as run
+        from hil.sensors.camera_motion import CameraMotion
 
+        moves = bool(shake_px or pan_deg or roll_deg)
+        motion = CameraMotion(shake_px=shake_px, pan_rad=radians(pan_deg), roll_rad=radians(roll_deg))
         film = None if no_video else camera.value
         run(
             RecordOptions(
@@ -96,6 +117,8 @@ def record(
                 camera=film,
                 realtime=realtime,
                 quality=None if quality is None else quality.value,
+                motion=motion if moves else None,
+                floor=floor.value,
             ),
             console,
         )

@@ -23,8 +23,8 @@ app = typer.Typer(
 )  # fmt: skip
 
 _TRACKER_HELP = (
-    "How to find robots in a video: aruco, colour:NAME,..., brightness:X0,Y0,X1,Y1, arms:INNER,OUTER, football or "
-    "flow:X0,Y0,X1,Y1 (pixels from the upper left corner)."
+    "How to find robots in a video: aruco or aruco:6x6_250, colour:NAME,..., brightness:X0,Y0,X1,Y1, "
+    "arms:INNER,OUTER, football or flow:X0,Y0,X1,Y1 (pixels from the upper left corner)."
 )
 
 
@@ -81,6 +81,12 @@ def decode(
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
     tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
+    reference: Annotated[
+        str,
+        typer.Option(
+            metavar="TRACK,...", help="Tracks that stand still, such as markers on the floor (default: found)."
+        ),
+    ] = "",
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
@@ -152,8 +158,8 @@ def decode(
         played = None if search_speed else 1.0 if speed is None else speed
         code = run_decode(
             DecodeOptions(
-                paths=tuple(paths), key=key, tracker=tracker, settings=settings, as_json=as_json, plot=plot,
-                explain=explain, reading=reading, frame_rate_hz=frame_rate, speed=played,
+                paths=tuple(paths), key=key, tracker=tracker, reference=_names(reference), settings=settings,
+                as_json=as_json, plot=plot, explain=explain, reading=reading, frame_rate_hz=frame_rate, speed=played,
             )
         )  # fmt: skip
     raise typer.Exit(code)
@@ -170,6 +176,12 @@ def learn_profile(
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
     tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
+    reference: Annotated[
+        str,
+        typer.Option(
+            metavar="TRACK,...", help="Tracks that stand still, such as markers on the floor (default: found)."
+        ),
+    ] = "",
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
@@ -191,7 +203,7 @@ def learn_profile(
 
         settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
         reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
-        run_profile(ProfileOptions(tuple(paths), key, out, tracker, settings, reading))
+        run_profile(ProfileOptions(tuple(paths), key, out, tracker, _names(reference), settings, reading))
 
 
 @app.command("journal")
@@ -300,6 +312,10 @@ def _unix_s(text: str | None) -> float | None:
             f"{text!r} is no date and time; write it like 2026-01-31T12:00:00Z", param_hint="--at"
         ) from None
     return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def _pairs(texts: Sequence[str]) -> dict[str, str]:

@@ -67,6 +67,20 @@ def messages(
         run(rollouts, seed, workers, out, cells, console)
 
 
+def cameras(
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Runs that each camera films.")] = 2,
+    seed: CellSeed = 900_000,
+    workers: Workers = None,
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "cameras.jsonl",
+) -> None:
+    """Measure the evidence left by a camera that shakes, pans and rolls, and by markers at an angle."""
+    with reported_console() as console:
+        from hil.commands.cameras import cameras as run
+
+        run(rollouts, seed, workers, out, cells, console)
+
+
 def frames(
     count: Annotated[int, typer.Option("-n", min=200, help="Frames under noise for each check.")] = 10_000,
     seed: CellSeed = 0,
@@ -197,5 +211,5 @@ def endurance(
 
 # In the order in which --help lists them.
 EXPERIMENTS: tuple[Callable[..., None], ...] = (
-    calibrate, bench, false_alarms, messages, frames, shim, robustness, sweep, faults, fuzz, endurance,
+    calibrate, bench, cameras, false_alarms, messages, frames, shim, robustness, sweep, faults, fuzz, endurance,
 )  # fmt: skip

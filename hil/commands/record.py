@@ -1,7 +1,7 @@
 """`mtm-hil record`: drive the simulated robots and record them."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -14,7 +14,8 @@ from hil.fleet.lockstep import run_lockstep
 from hil.fleet.realtime import START_S, run_realtime
 from hil.fleet.recording import Sensors, write_recording
 from hil.fleet.rig import RobotReport, RunSettings, Wire
-from hil.sensors.cameras import CAMERAS
+from hil.sensors.camera_motion import CameraMotion
+from hil.sensors.cameras import CAMERAS, FLOORS
 from hil.sensors.film_qualities import FILM_QUALITIES
 from hil.worlds.robomaster import fleet_scheme
 from mtm_onboard.protocol import generate_key, load_key, save_key
@@ -32,7 +33,7 @@ class RecordOptions:
     `message` None moves the robots without one, `key` None makes a key, `camera` None films nothing, `quality` None
     keeps the film nearly as the camera saw it. `realtime` runs
     the onboard programs on UARTs when `wire` is plaintext, over UDP when it is MAVLink and on serial CAN adapters
-    otherwise.
+    otherwise. `motion` None is a camera on a stand; `floor` is one of `FLOORS`.
     """
 
     out: Path
@@ -44,6 +45,8 @@ class RecordOptions:
     camera: str | None
     realtime: bool
     quality: str | None = None
+    motion: CameraMotion | None = None
+    floor: str = "mat"
 
 
 def record(options: RecordOptions, console: Console) -> None:
@@ -52,8 +55,9 @@ def record(options: RecordOptions, console: Console) -> None:
     framed = key.scheme.framing is not None
     symbols = None if options.message is None or framed else symbols_of_number(options.message, key.scheme)
     sensors = Sensors(
-        camera=None if options.camera is None else CAMERAS[options.camera],
+        camera=None if options.camera is None else replace(CAMERAS[options.camera], motion=options.motion),
         quality=None if options.quality is None else FILM_QUALITIES[options.quality],
+        scene=FLOORS[options.floor],
     )
     settings = RunSettings(
         key=key,

@@ -43,6 +43,7 @@ class DecodeOptions:
     paths: tuple[Path, ...]
     key: Path
     tracker: str
+    reference: tuple[str, ...]
     settings: DecodeSettings
     as_json: bool
     plot: Path | None
@@ -125,8 +126,9 @@ def _decode(options: DecodeOptions, key: Key, source: Source, stages: list[Stage
                 kind,
                 options.tracker,
                 lambda done: progress.update(task, completed=done),
-                options.reading,
-                options.frame_rate_hz,
+                options=options.reading,
+                frame_rate_hz=options.frame_rate_hz,
+                reference=options.reference,
             )
             recording = replace(recording, warnings=(*source.warnings, *recording.warnings))
         progress.remove_task(task)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mtm_audit.ingest.films import film_frames, is_picture
+from mtm_audit.ingest.load import tracked
 from mtm_audit.ingest.logs import read_logs
 from mtm_audit.ingest.source import sources_of
 from mtm_audit.model.recorded_at import RecordedAt
@@ -35,18 +36,20 @@ def read_recording(
     kind: Kind,
     tracker: str = "aruco",
     progress: Callable[[int], None] | None = None,
+    *,
     options: ReadOptions | None = None,
     frame_rate_hz: float | None = None,
+    reference: Sequence[str] = (),
 ) -> Recording:
     """Read the files into tracks; `progress` receives the number of frames tracked so far, `options` are of logs.
 
-    `frame_rate_hz` replaces the times of a film by even ones. Raises MtmError when a file cannot be used, or when two
-    files are of one body.
+    `frame_rate_hz` replaces the times of a film by even ones, and `reference` names tracks of a film that stand still;
+    the camera's own motion is taken out. Raises MtmError when a file cannot be used, or when two files are of one body.
     """
     warnings: list[str] = []
     if kind == "video":
-        chosen = tracker_named(tracker)
-        tracks = chosen.track(film_frames(files, chosen.pixels, warnings.append, frame_rate_hz), progress)
+        frames = film_frames(files, tracker_named(tracker).pixels, warnings.append, frame_rate_hz)
+        tracks = tracked(frames, tracker, reference, warnings.append, progress)
         at = _created_at(files, tracks)
     else:
         contents = read_logs(files, options or ReadOptions(), warnings.append)
