@@ -1,12 +1,20 @@
 """The command lines of `mtm-hil`'s experiments; what each does is loaded when it is asked for."""
 
 from collections.abc import Callable
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from hil.commands.options import CELLS_FOLDER, Cells, CellSeed, FirstSeed, OutCsv, Workers, reported_console
+
+
+class FrameName(StrEnum):
+    """Where the noise of a message lives; in step with `hil.experiments.real.added.Frame`."""
+
+    WORLD = "world"
+    BODY = "body"
 
 
 def calibrate(
@@ -152,6 +160,51 @@ def sweep(
         run(options, console)
 
 
+def real(
+    folder: Annotated[Path, typer.Argument(help="Recorded trajectories without a message: TUM or CSV files.")],
+    *,
+    messages: Annotated[int, typer.Option("-n", min=1, help="Messages on each recording, frame and sigma.")] = 2,
+    frame: Annotated[
+        list[FrameName] | None, typer.Option(help="Where the noise lives; may be repeated (default: both).")
+    ] = None,
+    sigma: Annotated[
+        list[float] | None, typer.Option(min=1e-4, max=10.0, help="Noise in m/s; may be repeated (default: 0.1).")
+    ] = None,
+    alphabet: Annotated[int, typer.Option(metavar="M", min=2, help="Alphabet size.")] = 8,
+    window: Annotated[float, typer.Option(metavar="SECONDS", min=0.1, help="Length of a symbol.")] = 4.0,
+    seconds: Annotated[float, typer.Option(min=1.0, help="Length of the piece of each recording.")] = 48.0,
+    band: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Band of the noise in Hz.")] = "0.5:4",
+    threshold: Annotated[float, typer.Option(min=0.0, max=1.0, help="How often a verdict may be wrong.")] = 1e-4,
+    onset_known: Annotated[bool, typer.Option("--onset-known", help="Tell the decode when the message began.")] = False,
+    seed: FirstSeed = 800_000,
+    workers: Workers = None,
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "real.jsonl",
+) -> None:
+    """Add messages to recorded motion, through plants drawn at random, and decode it."""
+    with reported_console() as console:
+        from hil.commands.real import RealOptions, band_of
+        from hil.commands.real import real as run
+
+        options = RealOptions(
+            folder=folder,
+            messages=messages,
+            frames=tuple(name.value for name in frame or FrameName),
+            sigmas=tuple(sigma or (0.1,)),
+            alphabet_size=alphabet,
+            window_s=window,
+            seconds=seconds,
+            band_hz=band_of(band),
+            threshold=threshold,
+            onset_known=onset_known,
+            seed=seed,
+            workers=workers,
+            out=out,
+            cells=cells,
+        )
+        run(options, console)
+
+
 def faults(
     seeds: Annotated[int, typer.Option("-n", min=1, help="Runs of each combination of wire, fault and loss.")] = 3,
     seed: Annotated[int, typer.Option(min=0, help="The first run's seed.")] = 0,
@@ -197,5 +250,5 @@ def endurance(
 
 # In the order in which --help lists them.
 EXPERIMENTS: tuple[Callable[..., None], ...] = (
-    calibrate, bench, false_alarms, messages, frames, shim, robustness, sweep, faults, fuzz, endurance,
+    calibrate, bench, false_alarms, messages, frames, shim, robustness, sweep, real, faults, fuzz, endurance,
 )  # fmt: skip

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.experiments.verdicts.sent import STEP_S, Sending, sent_track
+from hil.experiments.verdicts.sent import sent_track
 from hil.experiments.verdicts.vehicles import CALIBRATED, VEHICLES
+from hil.fleet.sending import STEP_S, Sending
 from hil.plants.velocity_responses import Floats, lagged
 from mtm_audit.model.track import FARTHEST, Track
 from mtm_onboard.protocol import Channel, Codebook, Scheme

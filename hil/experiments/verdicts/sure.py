@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.experiments.runs.cells import Cell, Scalar, Values
-from hil.experiments.verdicts.sent import Sending, sent_track
+from hil.experiments.verdicts.sent import sent_track
 from hil.experiments.verdicts.thresholds import THRESHOLDS, decode_at
 from hil.experiments.verdicts.vehicles import VEHICLES, Vehicle
+from hil.fleet.sending import Sending
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.track import Track
 from mtm_onboard.protocol import Channel, Key, MtmError, Scheme

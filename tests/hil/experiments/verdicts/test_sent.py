@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from hil.experiments.verdicts.sent import Sending, sent_track
+from hil.experiments.verdicts.sent import sent_track
 from hil.experiments.verdicts.vehicles import VEHICLES
+from hil.fleet.sending import Sending
 from mtm_onboard.runtime.modulator import Modulator
 from tests.audit.moving_robot import key_of, scheme_of
 

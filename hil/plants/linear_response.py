@@ -1,0 +1,51 @@
+"""A linear vehicle: gain, delay, first-order lag and oscillator of one axis, and what is known of such beforehand."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hil.plants.velocity_responses import Floats, delayed, lagged, second_order
+
+# Ranges that `draw_response` draws from: delay in s, natural frequency in Hz, damping ratio, gain.
+DELAYS_S, NATURALS_HZ, DAMPINGS, GAINS = (0.05, 0.3), (1.0, 6.0), (0.5, 1.0), (0.67, 1.2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearResponse:
+    """How one axis follows its demand: `gain` at rest, a delay, a lag where `lag_s` is above zero, and an oscillator
+    where `natural_hz` is given.
+    """
+
+    gain: float = 1.0
+    delay_s: float = 0.0
+    lag_s: float = 0.0
+    natural_hz: float | None = None
+    damping: float = 0.7
+
+    def followed(self, demand: Floats, step_s: float) -> Floats:
+        """What becomes of the demand (n,) from rest, (n,); the delay is rounded to whole steps."""
+        result = delayed(self.gain * demand[:, None], step_s, self.delay_s)
+        if self.lag_s > 0.0:
+            result = lagged(result, step_s, self.lag_s)
+        if self.natural_hz is not None:
+            result = second_order(result, step_s, self.natural_hz, self.damping)
+        return np.asarray(result[:, 0])
+
+    def at(self, frequencies_hz: Floats) -> Floats:
+        """The magnitude of the response at those frequencies."""
+        laplace = 2j * np.pi * np.asarray(frequencies_hz)
+        response = self.gain / (1.0 + self.lag_s * laplace)
+        if self.natural_hz is not None:
+            turn = 2.0 * np.pi * self.natural_hz
+            response = response * turn**2 / (laplace**2 + 2.0 * self.damping * turn * laplace + turn**2)
+        return np.asarray(np.abs(response))
+
+
+def draw_response(draw: np.random.Generator) -> LinearResponse:
+    """A delay and an oscillator from the prior: delay and damping uniform, frequency and gain uniform in their logs."""
+    return LinearResponse(
+        delay_s=float(draw.uniform(*DELAYS_S)),
+        natural_hz=float(np.exp(draw.uniform(*np.log(NATURALS_HZ)))),
+        damping=float(draw.uniform(*DAMPINGS)),
+        gain=float(np.exp(draw.uniform(*np.log(GAINS)))),
+    )
