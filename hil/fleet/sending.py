@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hil.plants.velocity_responses import Floats
+from hil.plants.responses import Floats
 from mtm_onboard.protocol import Channel, Codebook
 
 STEP_S = 0.01

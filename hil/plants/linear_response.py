@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hil.plants.velocity_responses import Floats, delayed, lagged, second_order
+from hil.plants.responses import Chain, Delay, Floats, Gain, Response, lag, oscillator
 
 # Ranges that `draw_response` draws from: delay in s, natural frequency in Hz, damping ratio, gain.
 DELAYS_S, NATURALS_HZ, DAMPINGS, GAINS = (0.05, 0.3), (1.0, 6.0), (0.5, 1.0), (0.67, 1.2)
@@ -22,14 +22,18 @@ class LinearResponse:
     natural_hz: float | None = None
     damping: float = 0.7
 
-    def followed(self, demand: Floats, step_s: float) -> Floats:
-        """What becomes of the demand (n,) from rest, (n,); the delay is rounded to whole steps."""
-        result = delayed(self.gain * demand[:, None], step_s, self.delay_s)
+    def respond(self, step_s: float) -> Response:
+        """The response at rest; its delay is rounded to whole steps."""
+        stages: list[Response] = [Gain(self.gain), Delay(step_s, self.delay_s)]
         if self.lag_s > 0.0:
-            result = lagged(result, step_s, self.lag_s)
+            stages.append(lag(step_s, self.lag_s))
         if self.natural_hz is not None:
-            result = second_order(result, step_s, self.natural_hz, self.damping)
-        return np.asarray(result[:, 0])
+            stages.append(oscillator(step_s, self.natural_hz, self.damping))
+        return Chain(*stages)
+
+    def followed(self, demand: Floats, step_s: float) -> Floats:
+        """What becomes of the demand (n,) from rest, (n,)."""
+        return self.respond(step_s).advance(demand[:, None])[:, 0]
 
     def at(self, frequencies_hz: Floats) -> Floats:
         """The magnitude of the response at those frequencies."""

@@ -53,6 +53,18 @@ def spinning(count: int, step_s: float, draw: np.random.Generator) -> Floats:
     return np.stack([ahead, left, np.ones(count)], axis=1)
 
 
+def pick_and_place(count: int, step_s: float, draw: np.random.Generator) -> Floats:
+    """A tool's smooth moves of one to two seconds (least jerk) between places of a square of 0.3 m, with rests."""
+    path: list[Floats] = [np.zeros((1, 2))]
+    while sum(map(len, path)) <= count:
+        start, goal = path[-1][-1], draw.uniform(-0.15, 0.15, 2)
+        steps = round(draw.uniform(1.0, 2.0) / step_s)
+        part = np.arange(1, steps + 1)[:, None] / steps
+        path.append(start + (goal - start) * (10.0 * part**3 - 15.0 * part**4 + 6.0 * part**5))
+        path.append(np.repeat(goal[None, :], round(draw.uniform(0.1, 0.6) / step_s), axis=0))
+    return _level(np.diff(np.concatenate(path)[: count + 1], axis=0) / step_s)
+
+
 def _held(
     count: int, step_s: float, span_s: tuple[float, float], draw: np.random.Generator, value: Callable[[], float]
 ) -> Floats:

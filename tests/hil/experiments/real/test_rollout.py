@@ -8,8 +8,8 @@ from hil.experiments.real.added import with_message
 from hil.experiments.real.genie import genie_symbols
 from hil.experiments.real.rollout import RealJob, job_of, job_parameters, piece_of, read_real
 from hil.fleet.sending import Sending
-from hil.plants.body_path import path_xy_m
 from hil.plants.linear_response import LinearResponse
+from hil.plants.robots import path
 from hil.worlds.open_loop import spinning
 from mtm_audit.model.track import Track
 from mtm_onboard.protocol import Channel, Key
@@ -24,7 +24,7 @@ def spinning_track(seconds=20.0, noise_m=0.0005, seed=3):
     draw = np.random.default_rng(seed)
     count = round(seconds * 100)
     course = spinning(count, 0.01, draw)
-    positions = path_xy_m(course, 0.01) + noise_m * draw.standard_normal((count, 2))
+    positions = path(course, 0.01)[:, :2] + noise_m * draw.standard_normal((count, 2))
     return Track("robot", np.arange(count) * 0.01, positions, np.ones(count, bool),
                  headings_rad=np.cumsum(course[:, 2]) * 0.01)  # fmt: skip
 
