@@ -30,16 +30,32 @@ def calibrate(
 
 
 def bench(
+    *,
     rollouts: Annotated[int, typer.Option(min=1, help="Rollouts of the main conditions; slow ones take fewer.")] = 200,
     quick: Annotated[
         bool, typer.Option("--quick", help="A few rollouts of some conditions, for a first look.")
     ] = False,
+    plants: Annotated[
+        str | None,
+        typer.Option(metavar="NAMES", help="Other robots instead: all, or names of the family parted by commas."),
+    ] = None,
+    ticks: Annotated[int, typer.Option(min=10, help="With --plants: window of a symbol.")] = 100,
     out: OutCsv = None,
     plot: Annotated[Path | None, typer.Option(help="A picture to draw: accuracy over the window length.")] = None,
     cells: Cells = CELLS_FOLDER / "bench.jsonl",
 ) -> None:
     """Compare the paper's detector and ours with the genie, an oracle, on the same recordings."""
+    if plants is not None and (quick or plot is not None):
+        raise typer.BadParameter("--quick and --plot do not go with --plants; take fewer --rollouts for a first look")
     with reported_console() as console:
+        if plants is not None:
+            from hil.commands.bench_plants import PlantsOptions, bench_plants
+            from hil.experiments.plants.rollout import PlantJob
+
+            job = PlantJob(ticks=ticks)
+            asked = PlantsOptions(plants=plants, job=job, rollouts=rollouts, out=out, cells=cells)
+            bench_plants(asked, console)
+            return
         from hil.commands.bench import BenchOptions
         from hil.commands.bench import bench as run
 

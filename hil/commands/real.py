@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from hil.experiments.real.added import Frame, known_headings
+from hil.experiments.detectors.body_frame import known_headings
+from hil.experiments.real.added import Frame
 from hil.experiments.real.rollout import DETECTORS, RealJob, job_parameters, read_real, recorded_track
 from hil.experiments.runs.cells import Cell, CellStore, Values
 from hil.experiments.runs.proportion import Proportion

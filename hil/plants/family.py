@@ -86,7 +86,7 @@ def _holonomic(draw: Draw) -> Robot:
 
 
 def _heavy(draw: Draw) -> Robot:
-    slew = _uniform(draw, 0.15, 0.5)
+    slew = _uniform(draw, 0.2, 0.5)
     return _on_the_ground(draw, lambda step_s: Chain(lag(step_s, 0.8), SlewLimit(step_s, slew)))
 
 

@@ -23,10 +23,21 @@ def zigzag(count: int, step_s: float, draw: np.random.Generator) -> Floats:
 
 def wander(count: int, step_s: float, draw: np.random.Generator) -> Floats:
     """A smooth random course below the band of the noise."""
-    sections = signal.butter(2, 0.3, fs=1.0 / step_s, output="sos")
-    before = round(10.0 / step_s)
+    return _smooth(count, step_s, 0.3, draw)
+
+
+def cruise(count: int, step_s: float, draw: np.random.Generator) -> Floats:
+    """A smooth random course that a heavy vehicle can follow: its accelerations are about 0.2 m/s2."""
+    return _smooth(count, step_s, 0.1, draw)
+
+
+def _smooth(count: int, step_s: float, below_hz: float, draw: np.random.Generator) -> Floats:
+    sections = signal.butter(2, below_hz, fs=1.0 / step_s, output="sos")
+    before = round(3.0 / (below_hz * step_s))
     course = signal.sosfilt(sections, draw.standard_normal((before + count, 2)), axis=0)[before:]
-    return _level(0.35 * course / course.std())
+    # The standard deviation of such noise in the long run, whatever this piece has.
+    impulse = signal.sosfilt(sections, np.eye(1, round(20.0 / (below_hz * step_s)))[0])
+    return _level(0.35 * course / np.sqrt(np.sum(impulse**2)))
 
 
 def stop_and_go(count: int, step_s: float, draw: np.random.Generator) -> Floats:

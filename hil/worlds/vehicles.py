@@ -7,7 +7,7 @@ import numpy as np
 
 from hil.plants.family import PLANTS, PlantKind
 from hil.plants.responses import Floats
-from hil.worlds.open_loop import pick_and_place, spinning, steering, stop_and_go, wander, zigzag
+from hil.worlds.open_loop import cruise, pick_and_place, spinning, steering, stop_and_go, wander, zigzag
 from mtm_onboard.protocol import MtmError
 
 # From the number of steps and their length to demanded body velocities (n, 3).
@@ -18,6 +18,7 @@ _CONTROLLERS: dict[str, tuple[Controller, ...]] = {
     "robomaster": (zigzag,),
     "diff-drive": (steering,),
     "spinning": (spinning,),
+    "heavy": (cruise,),
     "arm": (pick_and_place,),
     "stop-and-go": (stop_and_go,),
 }

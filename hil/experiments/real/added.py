@@ -10,9 +10,10 @@ from typing import Literal
 
 import numpy as np
 
+from hil.experiments.detectors.body_frame import known_headings, middles, turned
 from hil.fleet.sending import STEP_S, Sending
 from hil.plants.linear_response import LinearResponse
-from mtm_audit.model.track import Bools, Floats, Track
+from mtm_audit.model.track import Floats, Track
 from mtm_onboard.protocol import MtmError
 
 Frame = Literal["world", "body"]
@@ -55,24 +56,3 @@ def displacements(times_s: Floats, sending: Sending, responses: Mapping[str, Lin
     ]
     moved = np.stack(columns, axis=1)
     return np.asarray(moved - moved[0])
-
-
-def known_headings(track: Track) -> Bools:
-    """Where the heading is known, (n,); raises MtmError with fewer than three of them."""
-    headings = np.full(len(track.times_s), np.nan) if track.headings_rad is None else track.headings_rad
-    known: Bools = np.isfinite(headings)
-    if np.count_nonzero(known & track.valid) < 3:
-        raise MtmError(f"track {track.name!r} has no heading; measure it in the world's frame, with --frame world")
-    return known
-
-
-def turned(vectors: Floats, angles_rad: Floats) -> Floats:
-    """Vectors (n, 2), each turned counter-clockwise by its angle (n,)."""
-    cosine, sine = np.cos(angles_rad), np.sin(angles_rad)
-    x, y = vectors.T
-    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
-
-
-def middles(values: Floats) -> Floats:
-    """The mean of each two neighbours, (n - 1,)."""
-    return np.asarray(0.5 * (values[1:] + values[:-1]))

@@ -4,17 +4,26 @@ A robot that repeats a message of one symbol: key, symbol, plant, clock, the pie
 from the seed. The verdict comes from a decode that searches for the onset; the windows are counted in one that is told.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hil.experiments.real.added import Frame, known_headings, with_message
-from hil.experiments.real.genie import genie_symbols
+from hil.experiments.detectors.body_frame import known_headings
+from hil.experiments.detectors.linear_genie import (
+    GenieKnowledge,
+    axis_motion,
+    fit_interference,
+    genie_symbols,
+    moved_by_responses,
+)
+from hil.experiments.real.added import Frame, with_message
 from hil.experiments.runs.cells import Scalar, Values
 from hil.fleet.sending import Sending
-from hil.plants.linear_response import draw_response
+from hil.plants.linear_response import LinearResponse, draw_response
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.ingest.load import load_tracks
@@ -99,7 +108,7 @@ def read_real(parameters: Values, seed: int) -> dict[str, Scalar]:
     responses = dict.fromkeys(scheme.channels[0].axes, response)
     seen = with_message(silent, sending, responses, job.frame)
     windows = int((seen.times_s[-1] - onset_s) * rate_scale / job.window_s)
-    genie = genie_symbols(silent, seen, sending, responses, job.frame, windows)
+    genie = _genie_symbols(silent, seen, sending, responses, job.frame, windows)
     result: dict[str, Scalar] = {
         "symbol": symbol, "start_s": float(silent.times_s[0]), "onset_s": onset_s, "delay_s": response.delay_s,
         "natural_hz": float(response.natural_hz or 0.0), "damping": response.damping, "gain": response.gain,
@@ -108,6 +117,22 @@ def read_real(parameters: Values, seed: int) -> dict[str, Scalar]:
     for detector in DETECTORS:
         result[detector] = right_windows(seen, key, detector, onset_s, windows, symbol)
     return {**result, **_verdict(seen, key, job, onset_s, symbol)}
+
+
+def _genie_symbols(
+    silent: Track,
+    seen: Track,
+    sending: Sending,
+    responses: Mapping[str, LinearResponse],
+    frame: Frame,
+    windows: int,
+) -> NDArray[np.int64]:
+    """Symbols by the linear genie, whose interference is fitted to the motion before the message was added."""
+    axes, highest_hz = sending.channel.axes, sending.codebook.scheme.band_hz[1]
+    before, after = (axis_motion(track, axes, highest_hz, body=frame == "body") for track in (silent, seen))
+    interference = tuple(fit_interference([before], axis) for axis in range(len(axes)))
+    known = GenieKnowledge(moved_by_responses(sending, responses), interference)
+    return genie_symbols(after, sending, known, windows)
 
 
 def right_windows(track: Track, key: Key, detector: str, onset_s: float, windows: int, symbol: int) -> int:

@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hil.experiments.real.added import displacements, turned, with_message
+from hil.experiments.detectors.body_frame import turned
+from hil.experiments.real.added import displacements, with_message
 from hil.fleet.sending import Sending
 from hil.plants.linear_response import LinearResponse
 from mtm_audit.model.track import Track

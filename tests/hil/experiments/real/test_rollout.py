@@ -4,15 +4,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hil.experiments.real.added import with_message
-from hil.experiments.real.genie import genie_symbols
 from hil.experiments.real.rollout import RealJob, job_of, job_parameters, piece_of, read_real
-from hil.fleet.sending import Sending
-from hil.plants.linear_response import LinearResponse
 from hil.plants.robots import path
 from hil.worlds.open_loop import spinning
 from mtm_audit.model.track import Track
-from mtm_onboard.protocol import Channel, Key
 
 JOB = RealJob(
     frame="world", sigma=0.1, alphabet_size=8, window_s=2.0, seconds=16.0, band_hz=(0.5, 4.0), threshold=1e-4,
@@ -50,22 +45,6 @@ def test_a_silent_recording_is_absent(tmp_path):
     result = read_real({**written(tmp_path, spinning_track()), **job_parameters(job)}, 2)
     assert result["verdict"] == "absent"
     assert result["genie"] < result["windows"]
-
-
-@pytest.mark.parametrize("axes", [("vx", "vy"), ("vx", "wz")])
-def test_the_genie_reads_body_axes_of_a_robot_that_turns(axes):
-    silent = spinning_track()
-    channel = Channel("robot", "robot", axes, 1, 0.05)
-    scheme = replace(JOB.scheme, channels=(channel,))
-    key = Key("fake", bytes(32), scheme)
-    sending = Sending(
-        codebook=key.codebook(), channel=channel, symbols=(5,), onset_s=0.7, messages=99, sigma=0.05, rate_scale=1.001
-    )
-    responses = {axis: LinearResponse(delay_s=0.1, natural_hz=2.0) for axis in axes}
-    seen = with_message(silent, sending, responses, "body")
-    assert genie_symbols(silent, seen, sending, responses, "body", 9).tolist() == [5] * 9
-    other = {axis: LinearResponse(delay_s=1.0, natural_hz=2.0) for axis in axes}
-    assert genie_symbols(silent, seen, sending, other, "body", 9).tolist() != [5] * 9
 
 
 def test_a_job_survives_as_the_parameters_of_a_cell():
