@@ -59,6 +59,9 @@ def record(
     key: KeyFile = None,
     wire: Annotated[WireName, typer.Option(help="CAN, plaintext or MAVLink protocol, or no wire.")] = WireName.CAN,
     seed: WorldSeed = 0,
+    plant: Annotated[
+        str, typer.Option(metavar="NAME", help="Kind of the robots; mtm-hil bench --plants all measures them.")
+    ] = "robomaster",
     camera: Annotated[CameraName, typer.Option(help="Which camera films.")] = CameraName.OVERHEAD,
     no_video: Annotated[bool, typer.Option("--no-video", help="Motion capture alone.")] = False,
     realtime: Annotated[
@@ -82,6 +85,7 @@ def record(
                 seed=seed,
                 camera=film,
                 realtime=realtime,
+                plant=plant,
             ),
             console,
         )
