@@ -60,7 +60,7 @@ def record(
     wire: Annotated[WireName, typer.Option(help="CAN, plaintext or MAVLink protocol, or no wire.")] = WireName.CAN,
     seed: WorldSeed = 0,
     plant: Annotated[
-        str, typer.Option(metavar="NAME", help="Kind of the robots; mtm-hil bench --plants all measures them.")
+        str, typer.Option(metavar="NAME", help="Kind of the robots, see mtm-hil bench --plants; or a plant file.")
     ] = "robomaster",
     camera: Annotated[CameraName, typer.Option(help="Which camera films.")] = CameraName.OVERHEAD,
     no_video: Annotated[bool, typer.Option("--no-video", help="Motion capture alone.")] = False,

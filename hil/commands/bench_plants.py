@@ -89,7 +89,9 @@ def _table(rows: Sequence[PlantRow], options: PlantsOptions) -> Table:
         shares = [str(row.symbols[detector]) for detector in DETECTORS]
         counts = (row.verdicts["decoded"], row.wrong, row.verdicts["inconclusive"],
                   row.verdicts["absent"] + row.verdicts["refused"])  # fmt: skip
-        table.add_row(row.plant, str(row.symbols["genie"].trials), *shares, *map(str, counts), f"{row.bits:.1f}")
+        table.add_row(
+            Path(row.plant).stem, str(row.symbols["genie"].trials), *shares, *map(str, counts), f"{row.bits:.1f}"
+        )
     return table
 
 
@@ -100,7 +102,8 @@ def _csv_row(row: PlantRow, options: PlantsOptions) -> tuple[object, ...]:
         share = row.symbols[detector]
         shares += [f"{value:.2f}" for value in (share.percent, *share.interval_percent)]
     return (
-        row.plant, " ".join(VEHICLES[row.plant].kind.axes), job.alphabet_size, job.ticks, job.windows, job.sigma,
+        Path(row.plant).name, " ".join(vehicle(row.plant).kind.axes),
+        job.alphabet_size, job.ticks, job.windows, job.sigma,
         options.rollouts, row.symbols["genie"].trials, *shares, *row.verdicts.values(), row.wrong, f"{row.bits:.2f}",
     )  # fmt: skip
 

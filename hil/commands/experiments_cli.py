@@ -37,7 +37,7 @@ def bench(
     ] = False,
     plants: Annotated[
         str | None,
-        typer.Option(metavar="NAMES", help="Other robots instead: all, or names of the family parted by commas."),
+        typer.Option(metavar="NAMES", help="Other robots instead: all, or names and plant files parted by commas."),
     ] = None,
     ticks: Annotated[int, typer.Option(min=10, help="With --plants: window of a symbol.")] = 100,
     out: OutCsv = None,
@@ -221,6 +221,38 @@ def real(
         run(options, console)
 
 
+def identify(
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="COMMANDS TRUTH", help="What was commanded and how the robot moved, for each robot."),
+    ],
+    *,
+    offset: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Added to the commands' times, such as when a journal begins.")
+    ] = 0.0,
+    plant: Annotated[Path | None, typer.Option(help="A plant file to write, for bench --plants and record.")] = None,
+    profile: Annotated[Path | None, typer.Option(help="A profile to write, for mtm-audit decode.")] = None,
+    summary: Annotated[str, typer.Option(help="What kind of robot it is, for the plant file.")] = "identified",
+    source: Annotated[str, typer.Option(help="Where the logs come from, for the plant file.")] = "",
+    out: OutCsv = None,
+) -> None:
+    """Measure how a robot follows its commands, from what was commanded and how it moved."""
+    with reported_console() as console:
+        from hil.commands.identify import IdentifyOptions
+        from hil.commands.identify import identify as run
+
+        options = IdentifyOptions(
+            files=tuple(files),
+            offset_s=offset,
+            summary=summary,
+            source=source,
+            plant=plant,
+            profile=profile,
+            out=out,
+        )
+        run(options, console)
+
+
 def faults(
     seeds: Annotated[int, typer.Option("-n", min=1, help="Runs of each combination of wire, fault and loss.")] = 3,
     seed: Annotated[int, typer.Option(min=0, help="The first run's seed.")] = 0,
@@ -266,5 +298,5 @@ def endurance(
 
 # In the order in which --help lists them.
 EXPERIMENTS: tuple[Callable[..., None], ...] = (
-    calibrate, bench, false_alarms, messages, frames, shim, robustness, sweep, real, faults, fuzz, endurance,
+    calibrate, bench, false_alarms, messages, frames, shim, robustness, sweep, real, identify, faults, fuzz, endurance,
 )  # fmt: skip

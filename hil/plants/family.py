@@ -5,12 +5,14 @@ A robot of a kind is drawn: each of its parameters is uniform in the range that 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from hil.plants.arm import Arm
 from hil.plants.interference import Gait, Interference, Slip, Sum
 from hil.plants.mecanum import MecanumParameters, MecanumPlant, calibrated_parameters
+from hil.plants.plant_file import IdentifiedPlant, load_plant
 from hil.plants.responses import (
     Chain,
     Delay,
@@ -151,8 +153,15 @@ def _uniform(draw: Draw, low: float, high: float) -> float:
     return float(draw.uniform(low, high))
 
 
+def kind_of(plant: IdentifiedPlant) -> PlantKind:
+    """Robots that were identified, as a kind."""
+    return PlantKind(plant.summary, plant.axes, plant.draw)
+
+
 _WORLD = ("vx", "vy")
 ROBOMASTER = "robomaster"
+# Identified from logs of ten real robots.
+CREATE_FILE = Path(__file__).with_name("create_plant.toml")
 
 PLANTS: dict[str, PlantKind] = {
     ROBOMASTER: PlantKind("mecanum wheels, calibrated to the paper's hardware", _WORLD, _robomaster),
@@ -165,4 +174,5 @@ PLANTS: dict[str, PlantKind] = {
     "stop-and-go": PlantKind("stands half of the time, held by friction", _WORLD, _sticking),
     "tanh": PlantKind("a gain that bends as a hyperbolic tangent", _WORLD, _bent),
     "notch": PlantKind("a notch filter in the command path", _WORLD, _notched),
+    "create": kind_of(load_plant(CREATE_FILE)),
 }

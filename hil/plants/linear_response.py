@@ -3,8 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hil.plants.responses import Chain, Delay, Floats, Gain, Response, lag, oscillator
+
+Complexes = NDArray[np.complex128]
 
 # Ranges that `draw_response` draws from: delay in s, natural frequency in Hz, damping ratio, gain.
 DELAYS_S, NATURALS_HZ, DAMPINGS, GAINS = (0.05, 0.3), (1.0, 6.0), (0.5, 1.0), (0.67, 1.2)
@@ -35,14 +38,14 @@ class LinearResponse:
         """What becomes of the demand (n,) from rest, (n,)."""
         return self.respond(step_s).advance(demand[:, None])[:, 0]
 
-    def at(self, frequencies_hz: Floats) -> Floats:
-        """The magnitude of the response at those frequencies."""
+    def at(self, frequencies_hz: Floats) -> Complexes:
+        """The complex response at those frequencies, its delay not rounded."""
         laplace = 2j * np.pi * np.asarray(frequencies_hz)
-        response = self.gain / (1.0 + self.lag_s * laplace)
+        response = self.gain * np.exp(-self.delay_s * laplace) / (1.0 + self.lag_s * laplace)
         if self.natural_hz is not None:
             turn = 2.0 * np.pi * self.natural_hz
             response = response * turn**2 / (laplace**2 + 2.0 * self.damping * turn * laplace + turn**2)
-        return np.asarray(np.abs(response))
+        return np.asarray(response)
 
 
 def draw_response(draw: np.random.Generator) -> LinearResponse:

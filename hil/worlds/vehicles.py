@@ -2,10 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from hil.plants.family import PLANTS, PlantKind
+from hil.plants.family import PLANTS, PlantKind, kind_of
+from hil.plants.plant_file import load_plant
 from hil.plants.responses import Floats
 from hil.worlds.open_loop import cruise, pick_and_place, spinning, steering, stop_and_go, wander, zigzag
 from hil.worlds.robomaster import TaskFactory, go_to_goal
@@ -19,6 +21,7 @@ _COURSES = (zigzag, wander, stop_and_go)
 _CONTROLLERS: dict[str, tuple[Controller, ...]] = {
     "robomaster": (zigzag,),
     "diff-drive": (steering,),
+    "create": (steering,),
     "spinning": (spinning,),
     "heavy": (cruise,),
     "arm": (pick_and_place,),
@@ -29,6 +32,7 @@ _CONTROLLERS: dict[str, tuple[Controller, ...]] = {
 # What each does among the targets of the fleet's arena, where it is not the paper's task; an arm does not drive there.
 _TASKS: dict[str, TaskFactory | None] = {
     "diff-drive": steer_to_goal,
+    "create": steer_to_goal,
     "spinning": spin_to_goal,
     "arm": None,
     "stop-and-go": TASKS["stop and go"],
@@ -50,9 +54,16 @@ VEHICLES: dict[str, Vehicle] = {
 
 
 def vehicle(name: str) -> Vehicle:
-    """The vehicle of that name; raises MtmError when there is none."""
+    """The vehicle of that name, or of the plant file at that path, whose name ends in `.toml`.
+
+    Raises MtmError when there is none.
+    """
+    if name.endswith(".toml"):
+        kind = kind_of(load_plant(Path(name)))
+        steered = "vy" not in kind.axes
+        return Vehicle(kind, (steering,) if steered else _COURSES, steer_to_goal if steered else go_to_goal)
     if name not in VEHICLES:
-        raise MtmError(f"there is no plant {name!r}; choose from: {', '.join(VEHICLES)}")
+        raise MtmError(f"there is no plant {name!r}; choose from: {', '.join(VEHICLES)}, or name a plant file (.toml)")
     return VEHICLES[name]
 
 

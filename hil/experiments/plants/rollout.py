@@ -1,7 +1,9 @@
 """One message of one robot of the family, read by coherency, matched and the linear genie."""
 
+import hashlib
 import zlib
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -52,7 +54,11 @@ class PlantJob:
 
 def plant_cells(plant: str, job: PlantJob, rollouts: int, first_seed: int = FIRST_SEED) -> list[Cell]:
     """One cell for each message of a robot of that name."""
-    return [Cell("plants", {"plant": plant, **asdict(job)}, first_seed + number) for number in range(rollouts)]
+    given: dict[str, Scalar] = {"plant": plant, **asdict(job)}
+    if plant.endswith(".toml"):
+        # A file may change while its name stays.
+        given["digest"] = hashlib.sha256(Path(plant).read_bytes()).hexdigest()[:16]
+    return [Cell("plants", given, first_seed + number) for number in range(rollouts)]
 
 
 def read_plant(parameters: Values, seed: int) -> dict[str, Scalar]:
@@ -63,7 +69,7 @@ def read_plant(parameters: Values, seed: int) -> dict[str, Scalar]:
         float(parameters["sigma"]),
     )  # fmt: skip
     mover = vehicle(name)
-    draw = np.random.default_rng([_STREAM, zlib.crc32(name.encode()), seed])
+    draw = np.random.default_rng([_STREAM, zlib.crc32(Path(name).name.encode()), seed])
     scheme = job.scheme(mover.kind.axes)
     key, robot = Key("plants", draw.bytes(32), scheme), mover.kind.draw(draw)
     symbols = tuple(int(symbol) for symbol in draw.integers(0, job.alphabet_size, job.windows))

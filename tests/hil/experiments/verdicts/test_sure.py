@@ -7,8 +7,8 @@ from hil.experiments.verdicts.sure import FLEETS, PLANTS, decode_sent, summarise
 from mtm_onboard.protocol import MtmError
 
 
-def test_there_are_ten_plants_beside_the_calibrated_one():
-    assert len(PLANTS) == 11
+def test_there_are_eleven_plants_beside_the_calibrated_one():
+    assert len(PLANTS) == 12
 
 
 @pytest.mark.parametrize("plant", ["arm", FLEETS])
