@@ -190,7 +190,7 @@ def real(
     window: Annotated[float, typer.Option(metavar="SECONDS", min=0.1, help="Length of a symbol.")] = 4.0,
     seconds: Annotated[float, typer.Option(min=1.0, help="Length of the piece of each recording.")] = 48.0,
     band: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Band of the noise in Hz.")] = "0.5:4",
-    threshold: Annotated[float, typer.Option(min=0.0, max=1.0, help="How often a verdict may be wrong.")] = 1e-4,
+    threshold: Annotated[float, typer.Option(min=1e-12, max=1.0, help="How often a verdict may be wrong.")] = 1e-4,
     onset_known: Annotated[bool, typer.Option("--onset-known", help="Tell the decode when the message began.")] = False,
     seed: FirstSeed = 800_000,
     workers: Workers = None,

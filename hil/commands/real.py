@@ -77,7 +77,7 @@ def band_of(text: str) -> tuple[float, float]:
 
 
 def _files(folder: Path) -> list[Path]:
-    """The motion-capture files; each holds at least one second of motion."""
+    """The motion-capture files, each of which can be read; raises MtmError when one cannot, or there is none."""
     files, kind = recording_files([folder])
     if kind == "video":
         raise MtmError(f"{folder} is a video; name a folder of trajectories, TUM or CSV files")
@@ -152,6 +152,8 @@ def _summary(job: RealJob, cells: Sequence[Cell], results: Sequence[Values]) -> 
         f"{likeliest}; evidence {bits[0]:.1f} to {bits[-1]:.1f} bits, median {np.median(bits):.1f}"
     )
     windows = sum(int(result["windows"]) for result in results)
+    if not windows:
+        return [said, f"{name}: no piece shows a window"]
     shares = [
         f"{detector} {Proportion(sum(int(result[detector]) for result in results), windows)}"
         for detector in (*DETECTORS, "genie")

@@ -94,7 +94,7 @@ def _heavy(draw: Draw) -> Robot:
 
 def _legged(draw: Draw) -> Robot:
     ground = _on_the_ground(draw, _first_order(draw))
-    stride_hz, sway_mps = _uniform(draw, 0.8, 2.5), _uniform(draw, 0.05, 0.15)
+    stride_hz, sway_mps = _uniform(draw, 0.8, 2.5), _uniform(draw, 0.05, 0.2)
     return Robot(
         ground.respond,
         lambda step_s, own: Sum(ground.disturb(step_s, own), Gait(step_s, stride_hz, sway_mps, own)),

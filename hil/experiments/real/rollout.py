@@ -67,6 +67,13 @@ class RealJob:
         )
 
 
+# The result where a piece shows the robot for less than two windows.
+_NOTHING: dict[str, Scalar] = {
+    **dict.fromkeys(("onset_s", "delay_s", "natural_hz", "damping", "gain", "rate_scale", "bits"), 0.0),
+    **dict.fromkeys(("windows", "genie", *DETECTORS), 0), "verdict": "refused", "likeliest_right": False,
+}  # fmt: skip
+
+
 def job_parameters(job: RealJob) -> dict[str, Scalar]:
     """The job as parameters of a cell."""
     low, high = job.band_hz
@@ -97,9 +104,11 @@ def read_real(parameters: Values, seed: int) -> dict[str, Scalar]:
     symbol = int(draw.integers(job.alphabet_size))
     response = draw_response(draw)
     rate_scale = 1.0 + float(draw.uniform(-CLOCK_SPREAD, CLOCK_SPREAD))
-    silent = piece_of(track, job.seconds, float(draw.random()))
-    if job.frame == "body":
-        silent = with_headings_only(silent)
+    whole = with_headings_only(track) if job.frame == "body" else track
+    silent = piece_of(whole, job.seconds, float(draw.random()))
+    shown_s = silent.times_s[silent.valid]
+    if len(shown_s) < 3 or np.ptp(shown_s) < 2.0 * job.window_s:
+        return {**_NOTHING, "symbol": symbol, "start_s": float(silent.times_s[0])}
     onset_s = float(silent.times_s[0] + draw.uniform(0.0, job.window_s))
     sending = Sending(
         codebook=key.codebook(), channel=scheme.channels[0], symbols=(symbol,), onset_s=onset_s, messages=_MESSAGES,
@@ -165,14 +174,18 @@ def _verdict(track: Track, key: Key, job: RealJob, onset_s: float, symbol: int) 
 @lru_cache(maxsize=4)
 def recorded_track(path: Path, digest: str) -> Track:
     """The one track of a motion-capture file; the digest of its content keeps one file apart from another."""
-    (track,) = load_tracks(path)
-    return replace(track, name="robot")
+    tracks = load_tracks(path)
+    if len(tracks) != 1 or np.count_nonzero(tracks[0].valid) < 3:
+        raise MtmError(f"{path} does not show one body in three samples or more; leave it out of the folder")
+    return replace(tracks[0], name="robot")
 
 
 def piece_of(track: Track, seconds: float, place: float) -> Track:
     """`seconds` of a track, from its beginning with `place` 0 to its end with 1; the whole of a shorter one."""
     first_s = track.times_s[0] + place * max(0.0, track.times_s[-1] - track.times_s[0] - seconds)
     kept = (track.times_s >= first_s) & (track.times_s <= first_s + seconds)
+    if not kept.any():
+        kept = np.arange(len(track.times_s)) == int(np.searchsorted(track.times_s, first_s))
     headings = None if track.headings_rad is None else track.headings_rad[kept]
     return replace(
         track, times_s=track.times_s[kept], positions=track.positions[kept], valid=track.valid[kept],

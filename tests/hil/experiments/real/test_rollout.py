@@ -56,3 +56,20 @@ def test_a_piece_is_as_long_as_asked_and_lies_where_drawn():
     assert piece_of(track, 5.0, 0.0).times_s[[0, -1]] == pytest.approx([0.0, 5.0])
     assert piece_of(track, 5.0, 1.0).times_s[-1] == track.times_s[-1]
     assert len(piece_of(track, 50.0, 0.7).times_s) == len(track.times_s)
+
+
+def test_a_piece_that_shows_too_little_is_refused(tmp_path):
+    track = spinning_track()
+    kept = (track.times_s < 0.5) | (track.times_s > 19.7)
+    short = Track("robot", track.times_s[kept], track.positions[kept], np.ones(int(kept.sum()), bool),
+                  headings_rad=track.headings_rad[kept])  # fmt: skip
+    result = read_real({**written(tmp_path, short), **job_parameters(JOB)}, 1)
+    assert (result["verdict"], result["windows"], result["genie"]) == ("refused", 0, 0)
+
+
+def test_a_piece_without_any_sample_is_the_next_one():
+    track = spinning_track()
+    kept = (track.times_s < 0.5) | (track.times_s > 19.7)
+    gappy = Track("robot", track.times_s[kept], track.positions[kept], np.ones(int(kept.sum()), bool),
+                  headings_rad=track.headings_rad[kept])  # fmt: skip
+    assert piece_of(gappy, 1.0, 0.5).times_s == pytest.approx([19.71])
