@@ -77,6 +77,9 @@ def record(
     key: KeyFile = None,
     wire: Annotated[WireName, typer.Option(help="CAN, plaintext or MAVLink protocol, or no wire.")] = WireName.CAN,
     seed: WorldSeed = 0,
+    plant: Annotated[
+        str, typer.Option(metavar="NAME", help="Kind of the robots, see mtm-hil bench --plants; or a plant file.")
+    ] = "robomaster",
     camera: Annotated[CameraName, typer.Option(help="Which camera films.")] = CameraName.OVERHEAD,
     quality: Annotated[
         QualityName | None, typer.Option(help="Encode the film as these do; nearly lossless without.")
@@ -119,6 +122,7 @@ def record(
                 quality=None if quality is None else quality.value,
                 motion=motion if moves else None,
                 floor=floor.value,
+                plant=plant,
             ),
             console,
         )

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from hil.experiments.verdicts.sent import Sending, sent_track
-from hil.experiments.verdicts.vehicles import VEHICLES
+from hil.fleet.driven import sent_track
+from hil.fleet.sending import Sending
+from hil.worlds.vehicles import VEHICLES
 from mtm_onboard.runtime.modulator import Modulator
 from tests.audit.moving_robot import key_of, scheme_of
 
@@ -44,6 +45,7 @@ def test_every_vehicle_shows_its_noise_and_repeats_itself(name):
     quiet = sent_track("robot0", vehicle, [], 6.0, np.random.default_rng(1))
     loud = sent_track("robot0", vehicle, [sending()], 6.0, np.random.default_rng(1))
     assert quiet.positions.shape == (601, 2)
+    assert (quiet.headings_rad is None) == (name == "arm")
     assert np.allclose(quiet.positions[:40], loud.positions[:40])
     assert np.abs(quiet.positions - loud.positions)[60:].max() > 0.005
     again = sent_track("robot0", vehicle, [], 6.0, np.random.default_rng(1))
