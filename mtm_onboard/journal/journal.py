@@ -45,7 +45,8 @@ class Journal:
     """Writes one run; `threaded` hands the writing to a thread, as real time needs, and else `append` does it.
 
     At most `max_bytes` are kept, in eight segments of which the oldest gives way. An existing journal is kept: the new
-    one gets the next free number before its suffix, see `path`. Raises MtmError when the file cannot be opened.
+    one gets the next free number before its suffix, see `path`. Its owner alone can read it. Raises MtmError when the
+    file cannot be opened.
     """
 
     def __init__(
@@ -165,7 +166,7 @@ class Journal:
         except OSError:
             return False
         try:
-            fresh = self.path.open("xb", buffering=0)
+            fresh = _open_private(self.path)
         except OSError:
             with suppress(OSError):
                 os.replace(place, self.path)
@@ -186,13 +187,18 @@ class Journal:
                 os.fsync(self._file.fileno())
 
 
+def _open_private(path: Path) -> io.FileIO:
+    """A new file that its owner alone can read, whatever the umask: a journal tells what was said and when."""
+    return io.FileIO(path, "xb", opener=lambda name, flags: os.open(name, flags, 0o600))
+
+
 def _open_new(path: Path) -> tuple[Path, io.FileIO]:
     number = 1
     free = path
     while True:
         try:
             if not segments(free):
-                return free, free.open("xb", buffering=0)
+                return free, _open_private(free)
         except FileExistsError:
             pass  # it came between the look and the opening, or is no file at all
         except OSError as error:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mtm_onboard.protocol.atomicfile import replacing
+from mtm_onboard.protocol.atomicfile import write_new
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.input_file import BrokenTextError, decoded, opened, parsed_toml
@@ -47,10 +47,7 @@ def _check_id(key_id: object) -> None:
 
 def save_key(key: Key, path: Path) -> None:
     """Write the key file with mode 0600, whole or not at all; an existing file is refused, never overwritten."""
-    if path.exists():
-        raise MtmError(f"{path} exists already; choose another name or remove it first")
-    with replacing(path, mode=0o600) as temporary:
-        temporary.write_text(key_text(key), encoding="utf-8")
+    write_new(path, key_text(key), mode=0o600)
 
 
 def key_text(key: Key) -> str:

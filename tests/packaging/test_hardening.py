@@ -64,6 +64,10 @@ def test_the_service_exposes_little():
     assert float(exposure.group(1)) < 3.0
 
 
+def test_no_dump_of_the_service_holds_the_key():
+    assert "LimitCORE=0" in UNIT.read_text().splitlines()
+
+
 def calls_of(group: str) -> set[str]:
     """The system calls of one of systemd's groups and of those within it."""
     said = subprocess.run(
