@@ -217,7 +217,11 @@ class Modulator:
     def _end_tick(self, start_tick: int, message: Played) -> float:
         if isinstance(message, Silence):
             return start_tick
-        return np.inf if self._repeat else start_tick + self._message_ticks
+        end_tick = np.inf if self._repeat else start_tick + self._message_ticks
+        # Beyond the last slot that the key is for there is nothing to play.
+        last = self._codebook.last_slot
+        held = np.inf if last is None else (last - self._codebook.first_slot + 1) * self._message_ticks
+        return max(float(start_tick), min(end_tick, held))
 
     def _part_at(self, tick: int) -> _Part:
         following = self._next
