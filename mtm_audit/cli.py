@@ -55,7 +55,15 @@ def decode(
     paths: Annotated[
         list[Path], typer.Argument(metavar="PATH", help="A video, motion-capture files, or a folder of those.")
     ],
-    key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
+    key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The key file, unless --anchor and --disclosed are given.")
+    ] = None,
+    anchor: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A fleet's public anchor, to verify with a disclosed key.")
+    ] = None,
+    disclosed: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The disclosed key of the day on which the film was made.")
+    ] = None,
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
@@ -88,27 +96,40 @@ def decode(
         typer.Option(metavar="TIME", help="When the recording began (2026-01-31T12:00:00Z), for a rolling schedule."),
     ] = None,
     at_error: Annotated[
-        float, typer.Option(min=0.0, max=60.0, metavar="SECONDS", help="How far that time may be off.")
+        float,
+        typer.Option(
+            min=0.0,
+            max=60.0,
+            metavar="SECONDS",
+            help="How far that time may be off; 2 when both clocks are synchronised.",
+        ),
     ] = 30.0,
+    revoked: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Key files no longer trusted, as mtm-onboard revoke lists them.")
+    ] = None,
 ) -> None:
     """Decode the message in a recording.
 
     Exit codes: 0 decoded, 3 no message of this key, 4 inconclusive, 1 error, 2 usage, 130 interrupted.
     """  # fmt: skip
+    if (key is None) == (anchor is None and disclosed is None) or (anchor is None) != (disclosed is None):
+        raise typer.BadParameter("give a key file, or else an anchor and a disclosed key", param_hint="--key")
     onset_s, pairs, at_unix_s = _onset_s(onset), _pairs(assign or []), _unix_s(at)
     with reported("mtm-audit", "nothing was written"):
-        from mtm_audit.commands.decode import DecodeOptions, run_decode
+        from mtm_audit.commands.decode import DecodeOptions, KeySource, run_decode
         from mtm_audit.decoding.settings import DecodeSettings
         from mtm_audit.detectors.matched.profile import load_profile
         from mtm_audit.model.recorded_at import RecordedAt
+        from mtm_onboard.protocol.revocation import RevocationList, load_revocations
 
         known = None if profile is None else load_profile(profile)
         recorded = None if at_unix_s is None else RecordedAt(at_unix_s, at_error)
         settings = DecodeSettings(
             detector=detector, onset_s=onset_s, decoys=decoys, threshold=threshold, assignment=pairs, profile=known,
-            at=recorded,
+            at=recorded, revoked=RevocationList() if revoked is None else load_revocations(revoked),
         )  # fmt: skip
-        code = run_decode(DecodeOptions(tuple(paths), key, tracker, settings, as_json, plot, explain))
+        source = KeySource(key, anchor, disclosed)
+        code = run_decode(DecodeOptions(tuple(paths), source, tracker, settings, as_json, plot, explain))
     raise typer.Exit(code)
 
 

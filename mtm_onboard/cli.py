@@ -11,6 +11,9 @@ from importlib import import_module
 _COMMANDS = (
     "mtm_onboard.commands.keygen",
     "mtm_onboard.commands.issue",
+    "mtm_onboard.commands.anchor",
+    "mtm_onboard.commands.disclose",
+    "mtm_onboard.commands.revoke",
     "mtm_onboard.commands.show",
     "mtm_onboard.commands.doctor",
     "mtm_onboard.commands.run",

@@ -19,8 +19,11 @@ def payload_text(payload: Payload) -> str:
     return f'text "{payload}"' if isinstance(payload, str) else f"message {payload}"
 
 
-def frame_sentences(decoding: Decoding) -> tuple[str, ...]:
-    """What was delivered when, and what follows from its check; nothing for plain messages or without a message."""
+def frame_sentences(decoding: Decoding, *, authenticates: bool = True) -> tuple[str, ...]:
+    """What was delivered when, and what follows from its check; nothing for plain messages or without a message.
+
+    `authenticates` False leaves out what a tag would prove: what the verdict rests on is not enough for that.
+    """
     if decoding.verdict != "decoded" or not decoding.frames:
         return ()
     earlier = [
@@ -28,7 +31,8 @@ def frame_sentences(decoding: Decoding) -> tuple[str, ...]:
         for frame in decoding.frames[:-1]
         if frame.message.payload is not None
     ]
-    return (*earlier, proof_sentence(decoding))
+    proof = (proof_sentence(decoding),) if authenticates or decoding.frames[-1].message.check != "tag" else ()
+    return (*earlier, *proof)
 
 
 def proof_sentence(decoding: Decoding) -> str:
@@ -46,8 +50,8 @@ def proof_sentence(decoding: Decoding) -> str:
             "the key, nor that the recording's time is right."
         )
     return (
-        f"{proof}. It does not prove who held the key, nor when: under a fixed schedule an old motion played again "
-        "looks the same."
+        f"Its {message.check_bits}-bit tag holds ({chance}), so whoever wrote this message had the key. It does not "
+        "prove who held the key, nor when it was sent, nor by which robot."
     )
 
 

@@ -121,10 +121,13 @@ def run_session(
     channel, rate_hz = key.scheme.channel(config.robot.channel), key.scheme.rate_hz
     rolling = key.scheme.schedule == "rolling"
     # Before anything moves, so that whatever does not fit is found; a rolling message then gets its true slot.
-    modulator = _modulator(key, channel.name, plan, 0)
+    grant = key.holding.grant
+    modulator = _modulator(key, channel.name, plan, 0 if grant is None else grant.first_slot(key.scheme))
     clock, stats = SystemClock() if ends is None else ends.clock, LoopStats()
     wall = _wall(ends)
     _check_start(plan, wall.unix_s(), rolling=rolling)
+    if grant is not None:
+        grant.check_unexpired(wall.unix_s())
     guard = Guard(config.limits, config.staleness, noise_sigma=channel.sigma, period_s=1 / rate_hz)
     transport = _link(config, clock) if ends is None else ends.transport
     # The stack closes in reverse: the robot is told to stop before a socket or a slow disk is waited for.
@@ -149,6 +152,7 @@ def run_session(
         now_s, now_unix_s = clock.now(), wall.unix_s()
         last_slot = -1 if ledger is None else ledger.last_slot
         start_unix_s, first_slot = start_of(plan, key.scheme, now_unix_s, last_slot)
+        _check_span(key, first_slot)
         modulator = Modulator(key.codebook(first_slot), channel.name, played, repeat=plan.repeat)
         start_s = now_s + start_unix_s - now_unix_s
         journal = None
@@ -288,6 +292,8 @@ def _say_nowhere(tick: int, sentence: str) -> None:
 def introduction(config: RobotConfig, key: Key, message: Played, ends: Ends | None) -> Iterator[str]:
     """What a run says of itself before anything moves."""
     robot, scheme = config.robot, key.scheme
+    if key.warning is not None:
+        yield key.warning
     yield (
         f"{robot.name} plays channel {robot.channel} of scheme {scheme.name} ({scheme.fingerprint}) with key {key.id}: "
         f"{named(message) or 'no message'}"
@@ -315,6 +321,15 @@ def _check_start(plan: Plan, now_unix_s: float, *, rolling: bool) -> None:
         raise MtmError(
             f"the start is {now_unix_s - plan.start_unix_s:.3f} s in the past; give a time that is still to come, in "
             f"seconds since the Unix epoch (now is {now_unix_s:.0f})"
+        )
+
+
+def _check_span(key: Key, first_slot: int) -> None:
+    grant = key.holding.grant
+    if grant is not None and first_slot > grant.last_slot(key.scheme):
+        raise MtmError(
+            f"this key file is for days up to {grant.last_day}, and the message would begin after its last slot; have "
+            "one issued for the days to come"
         )
 
 

@@ -77,6 +77,10 @@ class Grant:
         """The scheme's epochs of its days."""
         return range(epoch_of_day(self.first_day, scheme), epoch_of_day(self.last_day, scheme) + 1)
 
+    def first_slot(self, scheme: Scheme) -> int:
+        """The first message slot that it is for."""
+        return last_slot_of_epoch(self.epochs(scheme)[0] - 1, scheme) + 1
+
     def last_slot(self, scheme: Scheme) -> int:
         """The last message slot that it is for."""
         last = last_slot_of_epoch(self.epochs(scheme)[-1], scheme)

@@ -35,6 +35,8 @@ socket = "{source}"
 path = "{journal}"
 """
 TOLD = """\
+mtm-onboard: key fake-key is of format 1: whoever has it can read and forge the messages of all robots and days; \
+mtm-onboard keygen and issue make keys of format 2
 mtm-onboard: robot0 plays channel robot1 of scheme robomaster-fleet (0123) with key fake-key: silence
 mtm-onboard: base commands come from the socket HERE/r.base and go to none
 mtm-onboard: to stop the robot: the datagram stop to the socket HERE/r.base; Ctrl-C ends the run

@@ -63,7 +63,7 @@ def test_an_auditor_reads_robots_that_have_their_own_files():
     assert message.number == 3
 
 
-def test_repeats_of_a_frame_add_up_although_each_slot_has_its_mask(monkeypatch):
+def test_repeats_of_a_frame_add_up_under_their_masks(monkeypatch):
     sent = tracks(seconds=38.0)
     decoding = decoded(sent, auditor())
     first, last = decoding.frames[0].slots
@@ -108,7 +108,7 @@ def test_another_fleet_s_master_reads_nothing():
     assert decoded(tracks(), key).verdict == "absent"
 
 
-def test_days_before_or_after_midnight_are_read_with_a_file_for_both():
+def test_a_film_over_midnight_is_read_with_a_file_for_both():
     midnight_s = datetime(2026, 12, 1, tzinfo=UTC).timestamp()
     slot = slot_at(midnight_s - 12.0, SCHEME)
     held = Key("fake-fleet", master().for_robot(["robot0", "robot1"], MONDAY, MONDAY + timedelta(1)), SCHEME)
