@@ -164,6 +164,9 @@ def learn_profile(
 @app.command("journal")
 def show_journal(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="The journal that mtm-onboard run wrote.")],
+    key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The run's key, which makes the noise again that is left out.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="Draw commands and lateness (.png, .pdf, .svg).")
@@ -173,7 +176,7 @@ def show_journal(
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.journal import run_journal
 
-        run_journal(path, as_json=as_json, plot=plot)
+        run_journal(path, as_json=as_json, plot=plot, key=key)
 
 
 @app.command()

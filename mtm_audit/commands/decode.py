@@ -115,8 +115,8 @@ def _check_before_public(opened: _Opened, at: RecordedAt | None) -> None:
     if public_from is not None and at is not None and at.unix_s >= public_from.timestamp():
         with stage("verdict"):
             raise MtmError(
-                f"the film is from after {public_from:%Y-%m-%d %H:%M} UTC, when the disclosed key was public: everybody "
-                "could make such a motion by then, so it proves nothing; verify films of the disclosed day"
+                f"the film is from after {public_from:%Y-%m-%d %H:%M} UTC, when the disclosed key was public: by then "
+                "everybody could make such a motion, so it proves nothing; verify films of the disclosed day"
             )
 
 

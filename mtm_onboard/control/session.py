@@ -164,7 +164,13 @@ def run_session(
                 start_unix_s=None if isinstance(wall, SimulatedWallClock) else start_unix_s,
             )  # fmt: skip
             journal = files.enter_context(
-                Journal(Path(config.journal.path), header, threaded=True, max_bytes=int(1e6 * config.journal.max_mb))
+                Journal(
+                    Path(config.journal.path),
+                    header,
+                    threaded=True,
+                    max_bytes=int(1e6 * config.journal.max_mb),
+                    hides_noise=True,
+                )
             )
         runtime = Runtime(modulator, guard, source, transport, journal)
         playing = Playing(modulator=modulator, first_tick=0, first_slot=first_slot, start_unix_s=start_unix_s)

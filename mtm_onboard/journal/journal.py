@@ -16,14 +16,17 @@ from typing import Self
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.journal_file import (
+    NOISE,
     Event,
     JournalHeader,
     JournalRecord,
+    PlayedSlot,
     event_line,
     heading,
     kept_segment,
     read_journal,
     segments,
+    slot_line,
 )
 
 __all__ = ["Journal", "JournalHeader", "JournalRecord", "read_journal"]
@@ -45,18 +48,27 @@ class Journal:
     """Writes one run; `threaded` hands the writing to a thread, as real time needs, and else `append` does it.
 
     At most `max_bytes` are kept, in eight segments of which the oldest gives way. An existing journal is kept: the new
-    one gets the next free number before its suffix, see `path`. Its owner alone can read it. Raises MtmError when the
-    file cannot be opened.
+    one gets the next free number before its suffix, see `path`. Its owner alone can read it.
+    With `hides_noise` it does not say what was sent in ticks with noise, which the key makes again from the slots that
+    `played` is told. Raises MtmError when the file cannot be opened.
     """
 
     def __init__(
-        self, path: Path, header: JournalHeader, *, threaded: bool, max_bytes: int = DEFAULT_MAX_BYTES
+        self,
+        path: Path,
+        header: JournalHeader,
+        *,
+        threaded: bool,
+        max_bytes: int = DEFAULT_MAX_BYTES,
+        hides_noise: bool = False,
     ) -> None:
+        self.hides_noise = hides_noise
         # Two counts, since two threads count.
         self._overrun = self._unwritten = 0
         self._header = header
-        self._waiting: deque[_Row | Event] = deque()
+        self._waiting: deque[_Row | Event | PlayedSlot] = deque()
         self._recent: deque[Event] = deque(maxlen=_REPEATED_EVENTS)
+        self._slot: PlayedSlot | None = None
         self._segment_bytes = max_bytes // _SEGMENTS
         self._kept = self._size = 0
         self._torn = self._unsynced = False
@@ -87,6 +99,10 @@ class Journal:
         """Keep an event for writing, as `append` keeps a tick; may be called from any thread."""
         self._keep(Event(tick, text[:_LONGEST_EVENT]))
 
+    def played(self, slot: PlayedSlot) -> None:
+        """Keep for writing what is played from a tick on, as `append` keeps a tick."""
+        self._keep(slot)
+
     def close(self) -> None:
         """Write what waits and close the file; safe to call more than once."""
         if self._file.closed:
@@ -104,7 +120,7 @@ class Journal:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _keep(self, entry: _Row | Event) -> None:
+    def _keep(self, entry: _Row | Event | PlayedSlot) -> None:
         waiting = self._waiting
         if len(waiting) >= _MOST_WAITING:
             self._overrun += 1
@@ -127,12 +143,17 @@ class Journal:
                 lines.append(self._line(self._waiting.popleft()))
             self._write(b"".join(lines))
 
-    def _line(self, entry: _Row | Event) -> bytes:
+    def _line(self, entry: _Row | Event | PlayedSlot) -> bytes:
+        if isinstance(entry, PlayedSlot):
+            self._slot = entry
+            return slot_line(entry)
         if isinstance(entry, Event):
             self._recent.append(entry)
             return event_line(entry)
         tick, now_s, base, sent, flags, late_s = entry
-        speeds = ",".join(f"{value:.9g}" for value in (*base, *sent))
+        speeds = ",".join(f"{value:.9g}" for value in base)
+        # With the fixed schedule's waveforms another body could play the message.
+        speeds += ",,," if self.hides_noise and flags & NOISE else "".join(f",{value:.9g}" for value in sent)
         return f"{tick},{now_s:.6f},{speeds},{late_s:.6f},{flags}\n".encode()
 
     def _write(self, text: bytes) -> None:
@@ -174,7 +195,7 @@ class Journal:
         self._file.close()
         self._file, self._size, self._torn = fresh, 0, False
         self._kept += 1
-        self._write(heading(self._header, self._recent))
+        self._write(heading(self._header, self._recent) + (b"" if self._slot is None else slot_line(self._slot)))
         _sync_folder(self.path.parent)
         return True
 

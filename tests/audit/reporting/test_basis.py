@@ -19,7 +19,7 @@ def decoding():
     return decode_tracks([track], KEY, DecodeSettings(onset_s=1.0))
 
 
-def test_a_fixed_schedule_is_told_and_nothing_of_an_absent_message(decoding):
+def test_a_fixed_schedule_is_told_unless_nothing_is_there(decoding):
     assert decoding.verdict == "decoded"
     assert basis_of(decoding, None, None).sentences == (FIXED,)
     assert basis_of(replace(decoding, verdict="inconclusive"), None, None).sentences == (FIXED,)

@@ -18,6 +18,7 @@ from mtm_onboard.model.clock import SystemClock
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.protocol.framing import Framing
+from mtm_onboard.protocol.journal_noise import with_noise
 from mtm_onboard.protocol.slots import slot_start_unix_s
 from mtm_onboard.runtime.config import config_from_table
 from mtm_onboard.runtime.guard import NOISE, STOPPED
@@ -100,7 +101,7 @@ def test_a_message_begins_exactly_at_the_boundary_answered(config):
         while asked(config, command="status")["tick"] < answer["tick"] + 3:
             pass
         outcome = running.end()
-    record = read_journal(outcome.journal.path)
+    record = with_noise(read_journal(outcome.journal.path), KEY)
     assert slot_start_unix_s(answer["slot"], SCHEME) == pytest.approx(answer["unix_s"], abs=1e-6)
     first_slot = answer["slot"] - answer["tick"] // 30
     assert record.header.start_unix_s == slot_start_unix_s(first_slot, SCHEME)
@@ -135,7 +136,7 @@ def test_a_robot_without_a_message_is_silent_before_and_after(config, schedule):
         outcome = running.end()
     assert (before["message"], before["silent"], during["message"], during["silent"]) == ("silence", True, 0, False)
     assert begun["tick"] % 30 == ended["tick"] % 30 == 0
-    record = read_journal(outcome.journal.path)
+    record = with_noise(read_journal(outcome.journal.path), key)
     assert record.header.symbols is None
     noisy = (record.sent != record.base).any(axis=1)
     within = (record.ticks >= begun["tick"]) & (record.ticks < ended["tick"])

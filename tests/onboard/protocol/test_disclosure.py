@@ -88,7 +88,7 @@ def test_the_anchor_is_not_a_day_and_shows_no_later_one():
         ANCHOR.verified(replace(disclosed(FIRST), secret=replace(held, grant=early)))
 
 
-def test_an_earlier_day_follows_from_a_disclosed_one_and_a_later_does_not():
+def test_earlier_days_follow_from_a_disclosed_one_and_later_not():
 
     tree, day = tree_of("fake-fleet", SCHEME), FIRST + timedelta(100)
     link = disclosed(day).holding.link
