@@ -139,13 +139,18 @@ class Journal:
         # In portions of a segment's size at most, however much has waited.
         while self._waiting:
             lines: list[bytes] = []
+            slot = self._slot
             while self._waiting and len(lines) < _INLINE_BATCH:
-                lines.append(self._line(self._waiting.popleft()))
+                entry = self._waiting.popleft()
+                lines.append(self._line(entry))
+                if isinstance(entry, PlayedSlot):
+                    slot = entry
+            # A segment that begins with these lines repeats the slot that is under way in the first of them.
             self._write(b"".join(lines))
+            self._slot = slot
 
     def _line(self, entry: _Row | Event | PlayedSlot) -> bytes:
         if isinstance(entry, PlayedSlot):
-            self._slot = entry
             return slot_line(entry)
         if isinstance(entry, Event):
             self._recent.append(entry)
