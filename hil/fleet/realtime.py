@@ -125,7 +125,10 @@ def _drive(
 
 
 def _arguments(settings: RunSettings, key_file: Path, start_unix_s: float) -> list[str]:
+    # Robots and recording are of one computer, so that its clock need not be right.
+    lab = ["--allow-unsynchronised"] if settings.key.scheme.schedule == "rolling" else []
     return [
+        *lab,
         "--key", str(key_file.resolve()), *_content(settings), "--start-at", f"{start_unix_s:.6f}",
         "--duration", f"{settings.seconds - settings.start_s:.6f}",
     ]  # fmt: skip

@@ -100,7 +100,7 @@ def fit_interference(motions: Sequence[Motion], axis: int) -> Interference:
         filtered = [signal.lfilter(before, [1.0], motion.velocities[axis : axis + 1]) for motion in motions]
         noise = fit_noise(filtered, [motion.seen for motion in motions], _ORDER)
         scale = np.sqrt(np.mean(np.square([scales[0] for scales in noise.scales])))
-        fits.append(Interference(np.convolve(noise.filter, before), np.array([scale])))
+        fits.append(Interference(np.convolve(noise.filters[0][0], before), np.array([scale])))
     return min(fits, key=lambda fit: float(fit.scales[0]))
 
 
