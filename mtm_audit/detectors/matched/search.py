@@ -25,6 +25,8 @@ SEARCHED_RATES = 0.2
 _PHASE_ERROR_RAD = 0.6
 _PEAKS_PER_RATE = 8
 _WEIGHED = 64
+# Window by window a weak message is lost among starts; at usual rates so many are weighed whatever they look like.
+_USUAL_STARTS = 128
 _USUAL_RATES = 0.03
 _PLAIN_NATS = 20.0
 _HALF_CELLS = np.arange(-3, 4) / 2.0
@@ -185,9 +187,10 @@ def _best_of_rates(
     for done, coarse in enumerate(rates):
         report(0.5 * done / len(rates))
         heard, grid = place(coarse)
-        for number, peaks in enumerate(fold(evidence_by_lag(tones, heard), grid, _PEAKS_PER_RATE)):
+        for number, peaks in enumerate(fold(evidence_by_lag(tones, heard), grid, _PEAKS_PER_RATE, _USUAL_STARTS)):
             candidates[number] += [_Candidate(coarse, peak) for peak in peaks]
-    chosen = [sorted(found, key=lambda item: -item.hypothesis.evidence)[:_WEIGHED] for found in candidates]
+    chosen = [sorted(found, key=lambda item: -item.hypothesis.evidence)[: _WEIGHED + _USUAL_STARTS]
+              for found in candidates]  # fmt: skip
     best = [(-np.inf, found[0]) for found in chosen]
     for coarse in sorted({item.coarse for found in chosen for item in found}):
         heard, grid = place(coarse)
