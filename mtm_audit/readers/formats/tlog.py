@@ -1,5 +1,6 @@
 """Telemetry logs (.tlog) of ground stations: MAVLink 1 and 2 packets, each behind the station's time, by pymavlink."""
 
+import re
 import struct
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
@@ -24,6 +25,7 @@ from mtm_onboard.protocol.input_file import opened
 
 WHAT = "a MAVLink telemetry log"
 _STAMP, _VERSION_1, _VERSION_2 = 8, 0xFE, 0xFD
+_MAGIC = re.compile(b"[\xfd\xfe]")
 _EARLIEST_US, _LATEST_US = 1e15, 4e15
 _LARGEST_BYTES = 4 << 30
 # Messages by number: positions in the order in which they are taken, then what else is needed.
@@ -97,7 +99,11 @@ def _packets(data: bytes, tell_broken: Callable[[], None]) -> Iterator[tuple[flo
         if not length:
             if not lost:
                 tell_broken()
-            lost, at = True, at + 1
+            lost = True
+            found = _MAGIC.search(data, at + _STAMP + 1)
+            if found is None:
+                return
+            at = found.start() - _STAMP
             continue
         lost = False
         yield struct.unpack_from(">Q", data, at)[0] * 1e-6, data[at + _STAMP : at + _STAMP + length]
