@@ -318,6 +318,21 @@ def test_a_file_of_a_bag_is_read_by_itself(tmp_path):
     assert close(read_log(path / "robot0.db3").tracks[0], POSE)
 
 
+def test_a_bag_converted_from_ros_1_is_read(tmp_path):
+    from rosbags.convert.converter import convert
+    from rosbags.typesys import Stores, get_typestore
+
+    source, target = write_rosbag1(tmp_path, POSE), tmp_path / "converted"
+    convert(
+        [source], target, dst_storage="sqlite3", dst_version=8, compress=None, compress_mode="none",
+        default_typestore=None, typestore=get_typestore(Stores.ROS2_HUMBLE), exclude_topics=(), include_topics=(),
+        exclude_msgtypes=(), include_msgtypes=(),
+    )  # fmt: skip
+    (track,) = read_log(target).tracks
+    assert track.times_s - UNIX_S == pytest.approx(POSE.times_s, abs=1e-6)
+    assert close(track, POSE)
+
+
 def test_a_plan_is_no_trajectory(tmp_path):
     kind, stamped = "nav_msgs/msg/Path", STAMPED.format("Pose")
     plan = [
