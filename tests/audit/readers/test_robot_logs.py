@@ -18,6 +18,7 @@ from tests.audit.readers.log_writers import (
     RosMessages,
     late_ns,
     write_c3d,
+    write_card,
     write_dataflash,
     write_foxglove,
     write_rosbag1,
@@ -115,6 +116,27 @@ def test_damage_in_a_telemetry_log_costs_what_is_damaged(tmp_path):
 def test_a_log_without_a_position_says_what_to_log(tmp_path):
     path = write_tlog(tmp_path, driving("robot0", seconds=0.4), odometry=True)
     with pytest.raises(MtmError, match="without a position; let the vehicle send LOCAL_POSITION_NED"):
+        read_log(path)
+
+
+def test_a_card_that_was_cut_gives_what_is_whole(tmp_path):
+    path = write_card(tmp_path, POSE)
+    path.write_bytes(path.read_bytes()[:-1000])
+    contents, warnings = warned(path)
+    assert 250 < len(contents.tracks[0].times_s) < 301
+    assert close(contents.tracks[0], POSE)
+    assert ["was cut or damaged" in warning for warning in warnings] == [True]
+
+
+def test_a_card_without_a_position_names_what_it_has(tmp_path):
+    path = write_card(tmp_path, POSE, variables=("acc.x(f)", "acc.y(f)", "acc.z(f)", "pm.vbat(f)"))
+    with pytest.raises(MtmError, match=r"without a position but with acc.x, acc.y, acc.z, pm.vbat"):
+        read_log(path)
+
+
+def test_names_from_a_file_command_no_terminal(tmp_path):
+    path = write_card(tmp_path, POSE, variables=("acc\n.x(f)", "acc\x1b[2J(f)", "a(f)", "b(f)"))
+    with pytest.raises(MtmError, match=r"with a, acc\?.x, acc\?\[2J, b;"):
         read_log(path)
 
 
