@@ -403,6 +403,24 @@ def test_a_cut_bag_of_ros_gives_what_is_whole(tmp_path):
     assert ["was cut short" in warning for warning in warnings] == [True]
 
 
+def test_transforms_of_foxglove_are_followed(tmp_path):
+    from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+    from mcap_protobuf.writer import Writer
+
+    path = tmp_path / "robot0.mcap"
+    with path.open("wb") as file, Writer(file) as writer:
+        for time_s, place, turn in POSE.rows():
+            message = FrameTransform(parent_frame_id="map", child_frame_id="robot")
+            message.timestamp.FromNanoseconds(nanoseconds(time_s))
+            for value, numbers in ((message.translation, place), (message.rotation, turn)):
+                for axis, number in zip("xyzw", numbers, strict=False):
+                    setattr(value, axis, number)
+            writer.write_message("/moves", message, nanoseconds(time_s), nanoseconds(time_s))
+    contents, warnings = warned(path)
+    assert close(contents.tracks[0], POSE)
+    assert ["robot is followed in the frame map" in warning for warning in warnings] == [True]
+
+
 def test_an_encoding_that_is_not_read_is_named(tmp_path):
     from mcap.writer import Writer
 
