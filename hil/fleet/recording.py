@@ -15,6 +15,7 @@ import numpy as np
 
 from hil.fleet.rig import RunResult, RunSettings, seeds_of
 from hil.sensors.camera import Camera, film
+from hil.sensors.film_qualities import FilmQuality, write_quality
 from hil.sensors.motion_capture import MotionCapture, capture, write_tum_files
 from hil.sensors.scene import Scene
 from hil.sensors.video import write_video
@@ -25,11 +26,12 @@ from mtm_onboard.protocol.framing import number_of_symbols
 
 @dataclass(frozen=True)
 class Sensors:
-    """What records the run; `camera` None leaves the video out."""
+    """What records the run; `camera` None leaves the video out, `quality` None keeps it nearly as it was seen."""
 
     motion_capture: MotionCapture = field(default_factory=MotionCapture)
     camera: Camera | None = None
     scene: Scene = field(default_factory=Scene)
+    quality: FilmQuality | None = None
 
 
 def motion_capture_tracks(result: RunResult, seed: int, system: MotionCapture) -> list[Track]:
@@ -50,8 +52,15 @@ def write_recording(
     write_tum_files(motion_capture_tracks(result, settings.seed, sensors.motion_capture), mocap)
     if sensors.camera is not None:
         frames = film(sensors.camera, sensors.scene, list(result.trajectories), _generators(settings.seed)[1])
-        write_video(_counted(frames, filmed), folder / "video.mp4", sensors.camera.rate_hz)
+        _write_film(_counted(frames, filmed), folder / "video.mp4", sensors.camera.rate_hz, sensors.quality)
     (folder / "truth.json").write_text(json.dumps(truth(settings, result), indent=2) + "\n", encoding="utf-8")
+
+
+def _write_film(frames: Iterator[Frame], path: Path, rate_hz: float, quality: FilmQuality | None) -> None:
+    if quality is None:
+        write_video(frames, path, rate_hz)
+    else:
+        write_quality(frames, path, rate_hz, quality)
 
 
 def truth(settings: RunSettings, result: RunResult) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Writing H.264 video whose time stamps are the camera's own."""
+"""Writing video whose time stamps are the camera's own."""
 
 from collections.abc import Iterable
 from fractions import Fraction
@@ -8,6 +8,7 @@ import av
 import cv2
 import numpy as np
 
+from hil.sensors.encoding import Encoding, constant_quality
 from mtm_audit.model.picture import Frame, Image
 from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
@@ -21,22 +22,28 @@ BGR_TO_UV = np.array([[0.439, -0.291, -0.148, 128], [-0.071, -0.368, 0.439, 128]
 
 
 def write_video(frames: Iterable[Frame], path: Path, nominal_rate_hz: float = 30.0, crf: int = 18) -> int:
-    """Encode `frames` (blue, green, red) as H.264 in yuv420p at constant quality `crf`; returns their number.
+    """Encode `frames` as `encode_video` does, as H.264 at constant quality `crf`."""
+    return encode_video(frames, path, nominal_rate_hz, constant_quality(crf))
+
+
+def encode_video(frames: Iterable[Frame], path: Path, nominal_rate_hz: float, encoding: Encoding) -> int:
+    """Encode `frames` (blue, green, red) into MP4; returns their number.
 
     Each frame keeps its own time, to 1/90000 s, so irregular and dropped frames survive; `nominal_rate_hz` only
     guides the encoder. Raises MtmError when there is no frame, a size is odd, or times do not increase.
     """
     count = 0
     with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4", options=MUXER) as container:
-        stream = container.add_stream("libx264", rate=Fraction(nominal_rate_hz).limit_denominator(1001))
-        stream.pix_fmt = "yuv420p"
-        stream.options = {"crf": str(crf), "preset": "veryfast"}
+        stream = container.add_stream(encoding.codec, rate=Fraction(nominal_rate_hz).limit_denominator(1001))
+        assert isinstance(stream, av.VideoStream)
         stream.time_base = stream.codec_context.time_base = TIME_BASE
         last_pts = -1
         for frame in frames:
             if count == 0:
-                stream.width, stream.height = _even(frame.size)
+                encoding.set_up(stream, _even(frame.size), nominal_rate_hz)
             picture = av.VideoFrame.from_ndarray(_planes(frame.image), format="yuv420p")
+            if encoding.pixel_format != "yuv420p":
+                picture = picture.reformat(format=encoding.pixel_format)
             picture.pts, picture.time_base = round(frame.time_s / TIME_BASE), TIME_BASE
             if picture.pts <= last_pts:
                 raise MtmError(f"frame time {frame.time_s:.6f} s does not come after the one before; sort the frames")

@@ -25,6 +25,7 @@ class ProfileOptions:
     key: Path
     out: Path
     tracker: str
+    reference: tuple[str, ...]
     settings: DecodeSettings
     reading: ReadOptions = field(default_factory=ReadOptions)
 
@@ -36,7 +37,7 @@ def run_profile(options: ProfileOptions) -> None:
     tracker(options.tracker)
     key = load_key(options.key)
     files, kind = recording_files(options.paths)
-    recording = read_recording(files, kind, options.tracker, options=options.reading)
+    recording = read_recording(files, kind, options.tracker, options=options.reading, reference=options.reference)
     decoding = decode_tracks(recording.tracks, key, options.settings)
     if decoding.verdict != "decoded":
         raise MtmError(

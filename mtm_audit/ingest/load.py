@@ -1,16 +1,23 @@
 """Any recording into tracks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from mtm_audit.model.picture import Frame
 from mtm_audit.model.track import Track
 from mtm_audit.readers.logs.opening import opening_of
 from mtm_audit.readers.logs.registry import check_foreign, format_of, read_log
 from mtm_audit.readers.text import check_readable
 from mtm_audit.readers.video import read_frames
 from mtm_audit.tracking.registry import tracker
+from mtm_onboard.protocol.errors import MtmError
 
-VIDEO_SUFFIXES = frozenset({".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts"})
+VIDEO_SUFFIXES = frozenset(
+    {".264", ".265", ".3gp", ".avi", ".h264", ".h265", ".hevc", ".ivf", ".m2ts", ".m4v", ".mjpeg", ".mjpg", ".mkv"}
+    | {".mov", ".mp4", ".mpeg", ".mpg", ".mts", ".mxf", ".obu", ".ogv", ".ts", ".vob", ".webm", ".wmv", ".y4m"}
+)
+# What these follow is no place in a picture, or is in a picture that a simulator drew.
+_NO_CAMERA = frozenset({"arms", "football", "brightness"})
 
 
 def is_video(path: Path) -> bool:
@@ -33,13 +40,33 @@ def load_tracks(
     tracker_name: str = "aruco",
     warn: Callable[[str], None] | None = None,
     progress: Callable[[int], None] | None = None,
+    reference: Sequence[str] = (),
 ) -> list[Track]:
     """Read one recording: a video through the named tracker, or a log or motion-capture file as it is.
 
+    The camera's own motion is taken out, by the tracks that `reference` names or by what is found to stand still.
     `warn` receives one sentence for each thing that is wrong but leaves something to use; `progress` the number of
     frames tracked so far. Raises MtmError when the recording cannot be used.
     """
     if not is_video(path):
         return list(read_log(path, warn=warn).tracks)
-    chosen = tracker(tracker_name)
-    return chosen.track(read_frames(path, chosen.pixels, warn), progress)
+    pixels = tracker(tracker_name).pixels
+    return tracked(read_frames(path, pixels, warn), tracker_name, reference, warn, progress)
+
+
+def tracked(
+    frames: Iterable[Frame],
+    tracker_name: str,
+    reference: Sequence[str] = (),
+    warn: Callable[[str], None] | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> list[Track]:
+    """The tracks in frames, the camera's own motion taken out; see `load_tracks`."""
+    chosen = tracker(tracker_name, warn)
+    if tracker_name.partition(":")[0] in _NO_CAMERA:
+        if reference:
+            raise MtmError(f"the tracker {tracker_name} measures nothing against a reference; leave out --reference")
+        return chosen.track(frames, progress)
+    from mtm_audit.tracking.stabilise import stabilised_tracks
+
+    return stabilised_tracks(chosen, frames, reference, warn, progress)

@@ -1,11 +1,12 @@
 """A whole recording, however many files it came in."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from mtm_audit.model.compression import Compression
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.track import Track
 
@@ -16,7 +17,9 @@ Kind = Literal["video", "motion capture"]
 class Recording:
     """What was recorded: the files, their tracks, and one sentence for each thing that was wrong but usable.
 
-    `at` is when the files say that they were recorded, None when they do not.
+    `at` is when the files say that they were recorded, None when they do not. `speed` is how many times as fast as the
+    files say it is played here, which was given, or found among others when `speed_searched`. `compression` is that of
+    a film, where it was asked for.
     """
 
     paths: tuple[Path, ...]
@@ -24,6 +27,17 @@ class Recording:
     tracks: tuple[Track, ...]
     warnings: tuple[str, ...] = ()
     at: RecordedAt | None = None
+    speed: float = 1.0
+    speed_searched: bool = False
+    compression: Compression | None = None
+
+    def begun_at(self, begun: RecordedAt) -> RecordedAt:
+        """When the recording's own clock stood at zero, if its first observation was made at `begun.unix_s`."""
+        return replace(begun, unix_s=begun.unix_s - self._first_s)
+
+    @property
+    def _first_s(self) -> float:
+        return min(float(track.times_s[0]) for track in self.tracks)
 
     @property
     def frames(self) -> int:
@@ -33,8 +47,7 @@ class Recording:
     @property
     def duration_s(self) -> float:
         """From the first observation of any track to the last."""
-        first_s = min(float(track.times_s[0]) for track in self.tracks)
-        return max(float(track.times_s[-1]) for track in self.tracks) - first_s
+        return max(float(track.times_s[-1]) for track in self.tracks) - self._first_s
 
     @property
     def frame_rate_hz(self) -> float | None:

@@ -5,6 +5,7 @@ import math
 from mtm_audit.decoding.decode import MORE_DECOYS, NEARLY
 from mtm_audit.decoding.decoding import CERTAIN, Decoding
 from mtm_audit.model.recording import Recording
+from mtm_audit.reporting.film_limits import film_limits
 from mtm_onboard.protocol.framing import payload_bits
 
 _LONGEST_FACTOR = 10.0
@@ -14,11 +15,16 @@ def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
     """Sentences for a decode that is not "decoded": what is uncertain and what to try; nothing otherwise."""
     if decoding.verdict == "decoded":
         return ()
+    return (*_of_the_verdict(recording, decoding), *film_limits(recording, decoding.scheme))
+
+
+def _of_the_verdict(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
     if decoding.verdict == "absent":
         return (
             "either nobody sent a message, or it was sent with another key, or the recording is too short or too "
             "coarse to show it",
             *_of_the_nearly_found(decoding),
+            *_of_the_speed(recording),
         )
     if decoding.scheme.framing is not None:
         return (_of_the_frame(decoding),)
@@ -34,6 +40,16 @@ def advice(recording: Recording, decoding: Decoding) -> tuple[str, ...]:
             f"{(1 << payload_bits(decoding.scheme)) - 1}; the robot was perhaps given symbols instead of a number",
         )
     return tuple(_of_the_uncertain(recording, decoding))
+
+
+def _of_the_speed(recording: Recording) -> tuple[str, ...]:
+    """A film does not show by itself that it was slowed down."""
+    if recording.kind != "video" or recording.speed_searched or recording.speed != 1.0:
+        return ()
+    return (
+        "slow motion, time lapse and a wrong frame rate look like this too: give --speed or --frame-rate when they are "
+        "known, or let --search-speed try common ones",
+    )
 
 
 def _of_the_nearly_found(decoding: Decoding) -> tuple[str, ...]:

@@ -299,7 +299,7 @@ def test_a_recording_that_is_none_is_refused_in_one_sentence(audit, tmp_path, na
 
 
 def test_a_folder_without_recordings_is_refused(audit, tmp_path):
-    refused(audit(tmp_path), "holds no log or motion capture")
+    refused(audit(tmp_path), "holds no video, no pictures and no log")
 
 
 def test_two_files_of_one_body_are_refused(audit, folder):
@@ -327,7 +327,7 @@ def test_an_explained_video_says_that_nothing_was_found(audit, video):
 
 
 def test_a_video_comes_alone(audit, video, folder):
-    refused(audit(video, folder / "sent"), "decode one video at a time")
+    refused(audit(video, folder / "sent"), "decode them one by one")
 
 
 def test_a_truncated_video_is_refused(audit, video):

@@ -12,6 +12,8 @@ from mtm_onboard.protocol.errors import MtmError
 _CELLS_PER_PERIOD = 5.0
 _SHORTEST_GAP_S = 0.15
 _FEWEST_CELLS = 16
+# Periods of the band's upper edge between two observations; at more of them most of the band averages out.
+_MOST_PERIODS = 2.0
 
 
 @dataclass(frozen=True)
@@ -33,9 +35,16 @@ def uniform_motion(glimpse: Glimpse, highest_hz: float) -> Motion:
     """Average a glimpse's velocities over cells that suit a band ending at `highest_hz`.
 
     Positions are interpolated through the observations, so irregular times and short gaps cost little; cells that
-    touch a longer gap are not seen. Raises MtmError when fewer than 16 cells come out.
+    touch a longer gap are not seen. Raises MtmError when fewer than 16 cells come out, or observations are so rare that
+    nothing of the band is left in them.
     """
-    step_s = max(float(np.median(glimpse.durations_s)), 1.0 / (_CELLS_PER_PERIOD * highest_hz))
+    usual_s = float(np.median(glimpse.durations_s))
+    if usual_s * highest_hz > _MOST_PERIODS:
+        raise MtmError(
+            f"track {glimpse.name!r} was observed {1.0 / usual_s:.2g} times a second, which is too seldom for a band "
+            f"up to {highest_hz:g} Hz; record with {2.0 * highest_hz:g} a second or more"
+        )
+    step_s = max(usual_s, 1.0 / (_CELLS_PER_PERIOD * highest_hz))
     steps = glimpse.velocities * glimpse.durations_s[:, None]
     positions = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
     count = int((glimpse.edges_s[-1] - glimpse.edges_s[0]) / step_s + 1e-6)

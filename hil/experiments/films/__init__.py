@@ -1,0 +1,1 @@
+"""What encoders leave of a message in a film."""

@@ -1,0 +1,113 @@
+"""Recordings whose clock ran at another speed than the robot's: slow motion, time lapse, a wrong frame rate."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.decoding.decoding import Decoding
+from mtm_audit.decoding.readings import Progress
+from mtm_audit.decoding.settings import DecodeSettings
+from mtm_audit.decoding.verdict import judged
+from mtm_audit.model.track import Track
+from mtm_audit.significance.decoys import DecoyComparison
+from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.key import Key
+
+# Cameras film slow motion and time lapse at powers of two and at 120, 60, 50, 25 or 24 frames a second shown at 24, 25
+# or 30. The likeliest come first, since the search ends with the first message that is decoded.
+SPEEDS = (1.0, 4.0, 2.0, 0.5, 8.0, 0.25, 1.2, 5 / 6, 1.5, 2 / 3, 2.4, 5.0, 2.5, 0.4, 0.125)
+
+
+def check_speed(speed: float) -> None:
+    """Raise MtmError unless something can be played that many times as fast."""
+    if not (math.isfinite(speed) and speed > 0.0):
+        raise MtmError(f"a recording cannot be played {speed} times as fast; give a number above zero")
+
+
+def played(tracks: Sequence[Track], speed: float) -> tuple[Track, ...]:
+    """The tracks played `speed` times as fast, their first instant where it was: 4 for 120 frames shown at 30.
+
+    Raises MtmError when that is no speed.
+    """
+    check_speed(speed)
+    begin_s = _begin_s(tracks)
+    return tuple(replace(track, times_s=begin_s + (track.times_s - begin_s) / speed) for track in tracks)
+
+
+def at_speed(settings: DecodeSettings, tracks: Sequence[Track], speed: float) -> DecodeSettings:
+    """The settings for what `played` gives of the tracks: an onset is meant in the recording's own time."""
+    if settings.onset_s is None:
+        return settings
+    begin_s = _begin_s(tracks)
+    return replace(settings, onset_s=begin_s + (settings.onset_s - begin_s) / speed)
+
+
+def decode_at_speeds(
+    tracks: Sequence[Track],
+    key: Key,
+    settings: DecodeSettings,
+    progress: Progress | None = None,
+    speeds: Sequence[float] = SPEEDS,
+) -> tuple[float, Decoding]:
+    """The speed that suits the recording best, and its decoding, with the search paid for.
+
+    All speeds have the same prior, so each one's e-values are divided by their number, for the message and for each
+    symbol; checks of frames count that many times. Whatever is decoded is wrong with the threshold's probability at
+    most. The search ends at the first speed that decodes. Raises MtmError when the recording can be read at none.
+    """
+    best: tuple[float, Decoding] | None = None
+    refusal: MtmError | None = None
+    for number, speed in enumerate(speeds):
+        shown = None if progress is None else _part(progress, number, len(speeds))
+        try:
+            found = decode_tracks(played(tracks, speed), key, at_speed(settings, tracks, speed), shown)
+        except MtmError as error:
+            refusal = refusal or error
+            continue
+        paid = paid_for(found, len(speeds))
+        if best is None or _worth(paid) > _worth(best[1]):
+            best = speed, paid
+        if paid.verdict == "decoded":
+            return speed, paid
+    if best is None:
+        raise refusal or MtmError("there is no speed to try; name at least one")
+    return best
+
+
+def paid_for(decoding: Decoding, choices: int) -> Decoding:
+    """The decoding as one of so many that were tried: its verdict, its evidence and the sureness of its symbols."""
+    cost = math.log(choices)
+    evidence = decoding.evidence
+    paid = replace(
+        evidence,
+        nats=_less(evidence.nats, cost),
+        decoys=None if evidence.decoys is None else _dearer(evidence.decoys, choices),
+    )
+    frames = tuple(
+        replace(frame, message=replace(frame.message, tried=choices * frame.message.tried)) for frame in decoding.frames
+    )
+    channels = tuple(replace(channel, nats=_less(channel.nats, cost)) for channel in decoding.channels)
+    symbols = tuple(_less(nats, cost) for nats in decoding.symbol_nats)
+    whole = replace(decoding, evidence=paid, symbol_nats=symbols, frames=frames, channels=channels)
+    return judged(whole, decoding.settings.threshold)
+
+
+def _less(nats: float | None, cost: float) -> float | None:
+    return None if nats is None else nats - cost
+
+
+def _dearer(comparison: DecoyComparison, choices: int) -> DecoyComparison:
+    return replace(comparison, p_value=min(1.0, choices * comparison.p_value))
+
+
+def _worth(decoding: Decoding) -> tuple[bool, float]:
+    return decoding.verdict != "absent", decoding.evidence.bits
+
+
+def _begin_s(tracks: Sequence[Track]) -> float:
+    return min((float(track.times_s[0]) for track in tracks if len(track.times_s)), default=0.0)
+
+
+def _part(progress: Progress, number: int, count: int) -> Progress:
+    return lambda stage, fraction: progress(f"speed {number + 1} of {count}: {stage}", (number + fraction) / count)

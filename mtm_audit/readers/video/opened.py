@@ -1,0 +1,56 @@
+"""Opening a video file and choosing the stream of pictures that moves."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mtm_audit.readers.text import check_readable
+from mtm_onboard.protocol.errors import MtmError
+
+if TYPE_CHECKING:
+    from av.container import InputContainer
+    from av.video.stream import VideoStream
+
+_STILL_CODECS = frozenset({"bmp", "gif", "jpeg2000", "mjpeg", "png", "tiff", "webp"})
+
+
+@contextmanager
+def opened_video(path: Path) -> Iterator[tuple["InputContainer", "VideoStream"]]:
+    """Yield container and stream, set up to decode with as many threads as suit the machine.
+
+    Raises MtmError when the file is missing, empty, a folder, or holds no film.
+    """
+    import av
+
+    check_readable(path)
+    try:
+        container = av.open(str(path))
+    except (OSError, ValueError) as error:
+        raise MtmError(
+            f"{path} is not a video that can be read, or its end is missing; copy it again or convert it to MP4"
+        ) from error
+    with container:
+        stream = _film_of(path, container)
+        # Damage is to stop the decoder: pictures that it patches up look plausible and are wrong.
+        stream.codec_context.options = {"err_detect": "explode"}
+        stream.thread_type = "AUTO"
+        yield container, stream
+
+
+def _film_of(path: Path, container: "InputContainer") -> "VideoStream":
+    """The first stream that is no still picture: drones and cutters put a cover into the file, often first."""
+    streams = container.streams.video
+    if not streams:
+        raise MtmError(f"{path} holds no video stream; name a file with pictures in it")
+    films = [stream for stream in streams if not _is_cover(stream)]
+    if not films:
+        raise MtmError(f"{path} holds a cover picture and no film; name a file with a film in it")
+    # Not every program marks its cover as one.
+    return next((stream for stream in films if stream.codec_context.name not in _STILL_CODECS), films[0])
+
+
+def _is_cover(stream: "VideoStream") -> bool:
+    from av.stream import Disposition
+
+    return bool(stream.disposition & (Disposition.attached_pic | Disposition.timed_thumbnails))
