@@ -57,8 +57,8 @@ def decoded_lines(data: bytes) -> list[str]:
     return text.removeprefix("\ufeff").splitlines()
 
 
-def read_lines(path: Path) -> list[str]:
-    """All lines of a text file; raises MtmError when it is missing, empty, too large or not text."""
+def read_bytes(path: Path) -> bytes:
+    """All bytes of a file; raises MtmError when it is missing, empty or too large."""
     check_readable(path)
     with opened(path, "the recording") as file:
         try:
@@ -67,8 +67,12 @@ def read_lines(path: Path) -> list[str]:
             raise MtmError(f"cannot read {path}: {error.strerror}; copy it again") from error
     if len(data) > _LARGEST_BYTES:
         raise MtmError(f"{path} has more than {_LARGEST_BYTES} bytes; cut it into parts")
+    return data
+
+
+def read_lines(path: Path) -> list[str]:
+    """All lines of a text file; raises MtmError as `read_bytes` does, and when it is not text."""
+    data = read_bytes(path)
     if not is_text(data[:4096]):
-        raise MtmError(
-            f"{path} is not text; motion capture must be a table of text or a format that docs/formats.md names"
-        )
+        raise MtmError(f"{path} is not text; motion capture must be a table of text or one of docs/formats.md")
     return decoded_lines(data)

@@ -1,6 +1,7 @@
 import inspect
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,6 +20,8 @@ from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.picture import Frame
 from mtm_onboard.protocol import save_key
 from tests.audit.moving_robot import FAKE_SECRET, OTHER_SECRET, key_of, robot_track, scheme_of
+from tests.audit.readers.log_writers import write_rosbag2
+from tests.audit.readers.moving_pose import driving
 from tests.patience import PATIENCE_S
 
 KEY = key_of(scheme_of(symbols=(1, 1), ticks=400))
@@ -425,3 +428,41 @@ def test_small_products_are_left_to_one_thread(monkeypatch):
     with pytest.raises(SystemExit):
         main(["--version"])
     assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
+
+
+def test_options_of_logs_reach_the_reader(audit, tmp_path):
+    lines = ["t,x,y", *(f"{10 * index},{index},0" for index in range(1000))]
+    (tmp_path / "robot0.csv").write_text("\n".join(lines))
+    code, out, _ = audit(tmp_path, "--unit", "mm", "--time-unit", "ms", "--onset", "0", "--json")
+    assert code in (0, 3, 4)
+    assert json.loads(out)["recording"]["duration_s"] == pytest.approx(9.99)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--unit", "parsec", "'parsec' is no unit of length; give one of m, dm, cm"),
+        ("--time-unit", "days", "'days' is no unit of time; give one of s, ms"),
+        ("--up", "w", "'w' is no axis; give one of x, y, z"),
+        ("--body", "rover", "'rover' is not NAME=MARKER,MARKER"),
+    ],
+)
+def test_options_of_logs_that_mean_nothing_are_refused(audit, folder, option, value, words):
+    refused(audit(folder / "sent", option, value), words)
+
+
+def test_a_topic_is_chosen_on_the_command_line(audit, tmp_path):
+    bag = write_rosbag2(tmp_path, driving("robot0", 10.0), driving("robot1", 10.0))
+    refused(audit(bag, "--topic", "/scan"), "has no /scan; it has: /robot0/odom, /robot1/odom")
+    code, out, _ = audit(bag, "--topic", "/robot1/odom", "--onset", "0", "--json")
+    assert code in (3, 4)
+    assert json.loads(out)["recording"]["duration_s"] == pytest.approx(10.0)
+
+
+def test_a_file_left_out_of_a_folder_is_told(audit, folder, tmp_path):
+    shutil.copytree(folder / "sent", tmp_path / "sent")
+    (tmp_path / "sent" / "prices.csv").write_text("day,price\n1,2\n")
+    _, out, _ = audit(tmp_path / "sent", "--onset", "1", "--json")
+    assert ["prices.csv is of no format that is read" in warning for warning in json.loads(out)["warnings"]].count(
+        True
+    ) == 1

@@ -13,6 +13,7 @@ ROWS = {
     "ROS 2 bag": "of ROS 2", "MCAP": "MCAP of other makes", "parquet": "LeRobot (parquet)",
     "MAVLink telemetry": "MAVLink telemetry", "Motive CSV": "Motive CSV", "Vicon CSV": "Vicon Tracker and Nexus CSV",
     "Qualisys TSV": "Qualisys TSV", "rostopic echo": "`rostopic echo -p`", "Crazyflie log": "Crazyflie log",
+    "Crazyflie card": "Crazyflie memory card",
     "MR.CLAM ground truth": "MR.CLAM ground truth", "TUM trajectory": "TUM trajectory", "KITTI poses": "KITTI poses",
     "table with a header": "table with a header", "C3D": "C3D",
 }  # fmt: skip

@@ -36,7 +36,7 @@ def read_dataflash(path: Path, options: ReadOptions, warn: Warn) -> Log:
     """
     reader = library("pymavlink.DFReader", path, WHAT)
     with foreign(path, WHAT):
-        with closing(reader.DFReader_binary(str(path), zero_time_base=False)) as log:
+        with closing(_quiet(reader)(path)) as log:
             rows = _rows(log)
         present = [name for kind in (*_ESTIMATES, *_GLOBAL) for name in sorted(rows) if name.partition(".")[0] == kind]
         if options.topics:
@@ -50,6 +50,28 @@ def read_dataflash(path: Path, options: ReadOptions, warn: Warn) -> Log:
         chosen = {name: name for name in options.topics} or {path.stem: first}
         bodies = tuple(_body(name, rows[topic], rows, options) for name, topic in chosen.items())
         return Log(bodies, at=_booted_at(rows))
+
+
+def _quiet(module: Any) -> Any:
+    """The library's reader without its compiled index, which writes past Python to standard error.
+
+    It closes the file also where it cannot be indexed.
+    """
+
+    class Quiet(module.DFReader_binary):  # type: ignore[misc]
+        def __init__(self, path: Path) -> None:
+            try:
+                super().__init__(str(path), zero_time_base=False)
+            except Exception:
+                for opened in ("data_map", "filehandle"):
+                    if hasattr(self, opened):
+                        getattr(self, opened).close()
+                raise
+
+        def init_arrays_fast(self, progress_callback: Any = None) -> None:
+            self.init_arrays(progress_callback)
+
+    return Quiet
 
 
 def _rows(log: Any) -> dict[str, list[Any]]:

@@ -1,6 +1,7 @@
 """OptiTrack Motive's CSV export, of format 1.1 on: rigid bodies, or else markers, in several rows of header."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,16 @@ class _Header:
     axes: list[str]
     first_line: int
     separator: str
+
+    @cached_property
+    def places(self) -> dict[tuple[str, str, str], dict[str, int]]:
+        """The columns of the axes of each kind, name and quantity."""
+        found: dict[tuple[str, str, str], dict[str, int]] = {}
+        for index in range(2, len(self.axes)):
+            if self.axes[index]:
+                cell = self.kinds[index], self.names[index], self.parts[index]
+                found.setdefault(cell, {}).setdefault(self.axes[index], index)
+        return found
 
 
 def recognises_motive(opening: Opening) -> bool:
@@ -114,12 +125,7 @@ def _times_s(header: _Header, values: Floats) -> Floats:
 
 
 def _columns(header: _Header, name: str, part: str, kinds: tuple[str, ...]) -> dict[str, int]:
-    return {
-        header.axes[index]: index
-        for index in range(2, len(header.axes))
-        if header.names[index] == name and header.parts[index] == part and header.kinds[index] in kinds
-        and header.axes[index]
-    }  # fmt: skip
+    return {axis: index for kind in kinds for axis, index in header.places.get((kind, name, part), {}).items()}
 
 
 def _rigid_bodies(header: _Header, times_s: Floats, values: Floats, unit_m: float, up: str) -> list[Body]:

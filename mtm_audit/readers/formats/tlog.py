@@ -1,5 +1,6 @@
 """Telemetry logs (.tlog) of ground stations: MAVLink 1 and 2 packets, each behind the station's time, by pymavlink."""
 
+import re
 import struct
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
@@ -18,14 +19,13 @@ from mtm_audit.readers.logs.libraries import foreign, library
 from mtm_audit.readers.logs.opening import Opening
 from mtm_audit.readers.logs.options import ReadOptions
 from mtm_audit.readers.logs.orientation import headings_at
-from mtm_audit.readers.text import check_readable
+from mtm_audit.readers.text import read_bytes
 from mtm_onboard.protocol.errors import MtmError
-from mtm_onboard.protocol.input_file import opened
 
 WHAT = "a MAVLink telemetry log"
 _STAMP, _VERSION_1, _VERSION_2 = 8, 0xFE, 0xFD
+_MAGIC = re.compile(b"[\xfd\xfe]")
 _EARLIEST_US, _LATEST_US = 1e15, 4e15
-_LARGEST_BYTES = 4 << 30
 # Messages by number: positions in the order in which they are taken, then what else is needed.
 _POSITIONS = {32: "LOCAL_POSITION_NED", 331: "ODOMETRY", 33: "GLOBAL_POSITION_INT"}
 _NEEDED = {**_POSITIONS, 30: "ATTITUDE", 2: "SYSTEM_TIME"}
@@ -50,9 +50,7 @@ def read_tlog(path: Path, options: ReadOptions, warn: Warn) -> Log:
     between; `options.arrival_times` takes the station's. Raises MtmError when no message has a position.
     """
     dialect = library("pymavlink.dialects.v20.common", path, WHAT, "logs")
-    check_readable(path)
-    with opened(path, "the recording") as file:
-        data = file.read(_LARGEST_BYTES)
+    data = read_bytes(path)
     with foreign(path, WHAT):
         systems, broken = _systems(data, dialect)
         if broken:
@@ -97,7 +95,11 @@ def _packets(data: bytes, tell_broken: Callable[[], None]) -> Iterator[tuple[flo
         if not length:
             if not lost:
                 tell_broken()
-            lost, at = True, at + 1
+            lost = True
+            found = _MAGIC.search(data, at + _STAMP + 1)
+            if found is None:
+                return
+            at = found.start() - _STAMP
             continue
         lost = False
         yield struct.unpack_from(">Q", data, at)[0] * 1e-6, data[at + _STAMP : at + _STAMP + length]

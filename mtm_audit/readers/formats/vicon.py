@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,12 @@ class _Block:
     axes: list[str]
     units: list[str]
     rows: list[Line]
+
+    @cached_property
+    def places(self) -> dict[tuple[str, str], int]:
+        """The column of each name and axis, the first where there are several."""
+        cells = list(zip(self.names, self.axes, strict=True))
+        return {cell: index for index, cell in reversed(list(enumerate(cells))) if index >= 2}
 
 
 def recognises_vicon(opening: Opening) -> bool:
@@ -98,8 +105,7 @@ def _table(path: Path, block: _Block) -> tuple[Floats, Floats, tuple[int, ...]]:
 
 
 def _triple(block: _Block, name: str, axes: tuple[str, str, str]) -> list[int]:
-    here = [index for index in range(2, len(block.axes)) if block.names[index] == name]
-    found = [next((index for index in here if block.axes[index] == axis), -1) for axis in axes]
+    found = [block.places.get((name, axis), -1) for axis in axes]
     return [] if -1 in found else found
 
 

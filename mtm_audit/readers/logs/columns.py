@@ -135,13 +135,20 @@ def _body(name: str, times_s: Floats, positions_m: Floats, values: Floats, colum
 
 
 def _column(index: int, cell: str) -> Column:
-    found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]", cell.strip())
-    name, unit = (found[1], found[2].strip().lower()) if found else (cell, "")
+    name, unit = _name_and_unit(cell.strip())
     name = re.sub(r"[\s./:-]+", "_", name.strip().lower()).strip("_")
     stem, _, last = name.rpartition("_")
     if not unit and stem and last in _UNITS:
         name, unit = stem, last
     return Column(index, name, _UNITS.get(unit))
+
+
+def _name_and_unit(cell: str) -> tuple[str, str]:
+    """The name and what stands behind it in brackets, in small letters; no expression, which long cells would stall."""
+    opened = max(cell.rfind("["), cell.rfind("("))
+    if opened < 0 or not cell.endswith(("]", ")")):
+        return cell, ""
+    return cell[:opened].rstrip(), cell[opened + 1 : -1].strip().lower()
 
 
 def _first(by_name: dict[str, Column], names: Sequence[str], ends: Sequence[str]) -> Column | None:

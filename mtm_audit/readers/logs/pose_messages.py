@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from mtm_audit.model.track import Floats
 # Messages that are poses, whatever package and language their definitions come from.
 POSE_TYPES = frozenset({
     "Odometry", "PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "PointStamped", "Path", "PoseInFrame",
-    "PosesInFrame",
 })  # fmt: skip
 TRANSFORM_TYPES = frozenset({"TFMessage", "tfMessage", "FrameTransform", "FrameTransforms"})
 
@@ -19,6 +19,19 @@ _ROOTS = (("pose", "pose"), ("pose",), ("transform",), ())
 _PLACES, _TURNS = ("position", "translation", "point"), ("orientation", "rotation")
 _STAMPS = (("header", "stamp"), ("timestamp",), ("stamp",))
 _SECONDS, _PARTS = ("sec", "seconds", "secs"), ("nanosec", "nanos", "nsec", "nsecs")
+
+
+# Where messages of ROS have what is looked for in all others: several times as quick, and most of any bag.
+_KNOWN = {
+    "Odometry": attrgetter("pose.pose.position", "pose.pose.orientation"),
+    "PoseWithCovarianceStamped": attrgetter("pose.pose.position", "pose.pose.orientation"),
+    "PoseStamped": attrgetter("pose.position", "pose.orientation"),
+    "TransformStamped": attrgetter("transform.translation", "transform.rotation"),
+}
+_KNOWN["Path"] = _KNOWN["PoseStamped"]
+_KNOWN["TFMessage"] = _KNOWN["tfMessage"] = _KNOWN["TransformStamped"]
+_XYZ, _XYZW = attrgetter("x", "y", "z"), attrgetter("x", "y", "z", "w")
+_HEADER = attrgetter("header.frame_id", "header.stamp.sec", "header.stamp.nanosec")
 
 
 @dataclass
@@ -109,7 +122,19 @@ def pose_of(message: Any) -> Pose | None:
 
 def poses_of(message: Any, kind: str) -> Iterator[tuple[str, str, int, Pose]]:
     """Parent frame, child frame, stamp and pose of each pose or transform in a message."""
+    known = _KNOWN.get(kind)
     for item in _items(message, kind):
+        if known is not None:
+            try:
+                place, turn = known(item)
+                frame, seconds, parts = _HEADER(item)
+                child = getattr(item, "child_frame_id", "")
+                stamp_ns = seconds * 1_000_000_000 + parts
+                yield frame.strip("/"), child.strip("/"), stamp_ns, (*_XYZ(place), *_XYZW(turn))
+                continue
+            except AttributeError:
+                # Of the same name and another make.
+                known = None
         pose = pose_of(item)
         if pose is not None:
             yield _frame(item, "parent_frame_id", "frame_id"), _frame(item, "child_frame_id"), stamp_ns_of(item), pose
@@ -118,7 +143,7 @@ def poses_of(message: Any, kind: str) -> Iterator[tuple[str, str, int, Pose]]:
 def _items(message: Any, kind: str) -> Iterable[Any]:
     if kind in ("TFMessage", "tfMessage", "FrameTransforms"):
         return fields_of(message, "transforms") or ()
-    if kind in ("Path", "PosesInFrame"):
+    if kind == "Path":
         return fields_of(message, "poses") or ()
     return (message,)
 

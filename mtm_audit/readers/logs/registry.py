@@ -1,13 +1,14 @@
 """All formats of logs and motion capture: which one a file is of, and reading it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.track import Track
 from mtm_audit.readers.formats.c3d import read_c3d, recognises_c3d
 from mtm_audit.readers.formats.crazyflie import read_crazyflie, recognises_crazyflie
+from mtm_audit.readers.formats.crazyflie_card import read_crazyflie_card, recognises_crazyflie_card
 from mtm_audit.readers.formats.dataflash import read_dataflash, recognises_dataflash
 from mtm_audit.readers.formats.headed import read_headed, recognises_headed
 from mtm_audit.readers.formats.kitti import read_kitti, recognises_kitti
@@ -54,6 +55,7 @@ FORMATS = (
     Format("ROS 2 bag", recognises_rosbag2, read_rosbag2),
     Format("MCAP", recognises_mcap, read_mcap),
     Format("parquet", recognises_lerobot, read_lerobot),
+    Format("Crazyflie card", recognises_crazyflie_card, read_crazyflie_card),
     Format("MAVLink telemetry", recognises_tlog, read_tlog),
     Format("Motive CSV", recognises_motive, read_motive),
     Format("Vicon CSV", recognises_vicon, read_vicon),
@@ -106,11 +108,24 @@ def read_log(path: Path, options: ReadOptions | None = None, warn: Warn | None =
     `warn` receives one sentence for each thing that is wrong but leaves something to use. Raises MtmError when the file
     cannot be used; it names the format where one was recognised.
     """
-    asked, told = options or ReadOptions(), warn or (lambda _: None)
-    opening = opening_of(path)
-    log = (format_of(opening) or _likeliest(opening)).read(path, asked, told)
-    tracks = tuple(track_of(body, str(path), told) for body in log.bodies) + log.tracks
-    return Contents(_distinct(path, tracks), log.at)
+    asked = options or ReadOptions()
+
+    def told(sentence: str) -> None:
+        if warn is not None:
+            warn(_printable(sentence))
+
+    try:
+        opening = opening_of(path)
+        log = (format_of(opening) or _likeliest(opening)).read(path, asked, told)
+        tracks = tuple(track_of(body, str(path), told) for body in log.bodies) + log.tracks
+        return Contents(_distinct(path, tracks), log.at)
+    except MtmError as error:
+        raise MtmError(_printable(str(error))) from error
+
+
+def _printable(text: str) -> str:
+    """The text in one line, without what would command a terminal: names come from files."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def _likeliest(opening: Opening) -> Format:
@@ -136,6 +151,7 @@ def _is_words(line: str) -> bool:
 
 
 def _distinct(path: Path, tracks: tuple[Track, ...]) -> tuple[Track, ...]:
+    tracks = tuple(replace(track, name=_printable(track.name)) for track in tracks)
     names = [track.name for track in tracks]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:

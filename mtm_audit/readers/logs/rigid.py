@@ -1,6 +1,5 @@
 """Markers into rigid bodies: which belong together, and the pose of each body in each frame."""
 
-import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -12,7 +11,8 @@ from mtm_onboard.protocol.errors import MtmError
 
 # Markers of one body keep their distances to a few millimetres; those of a leg do not.
 _MOST_BENT_M = 0.01
-_MARKER_NAME = re.compile(r"(.+?)[\s_:-]*(?:marker|mkr|m)?[\s_-]*\d+", re.IGNORECASE)
+# What may stand between the name of a body and the number of its marker.
+_JOINTS, _WORDS_FOR_MARKER = " _:-", ("marker", "mkr", "m")
 
 
 def grouped(labels: list[str], chosen: Mapping[str, tuple[str, ...]], where: str) -> dict[str, list[int]]:
@@ -74,5 +74,13 @@ def _body_name(label: str) -> str:
     subject, colon, _ = label.partition(":")
     if colon and subject:
         return subject
-    found = _MARKER_NAME.fullmatch(label)
-    return found[1] if found else label
+    stem = label.rstrip("0123456789")
+    if stem == label:
+        return label
+    stem = stem.rstrip(_JOINTS)
+    for word in _WORDS_FOR_MARKER:
+        # A letter alone is a word only where something joins it to the name.
+        if stem.lower().endswith(word) and (len(word) > 1 or stem[-2:-1] in tuple(_JOINTS)):
+            stem = stem[: -len(word)].rstrip(_JOINTS)
+            break
+    return stem or label

@@ -29,6 +29,8 @@ LOGS = {
     "ulog": logs.write_ulog,
     "dataflash": logs.write_dataflash,
     "tlog": logs.write_tlog,
+    "crazyflie card": logs.write_card,
+    "crazyflie card of version 1": partial(logs.write_card, version=1),
     "rosbag1": logs.write_rosbag1,
     "rosbag2 sqlite3": partial(logs.write_rosbag2, kind=STAMPED.format("Pose")),
     "rosbag2 mcap": partial(logs.write_rosbag2, kind=STAMPED.format("Transform"), mcap=True),

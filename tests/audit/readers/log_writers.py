@@ -2,6 +2,7 @@
 
 import json
 import struct
+import zlib
 
 import numpy as np
 
@@ -150,6 +151,24 @@ def write_tlog(folder, *poses, odometry=False):
     packets.sort(key=lambda packet: packet[0])
     path = folder / f"{name}.tlog"
     path.write_bytes(b"".join(struct.pack(">Q", at_us) + packet for at_us, packet in packets))
+    return path
+
+
+CARD_VARIABLES = ("stateEstimate.x(f)", "stateEstimate.y(f)", "stateEstimate.z(f)", "stateEstimate.yaw(f)")
+
+
+def write_card(folder, pose, version=2, variables=CARD_VARIABLES):
+    """What a Crazyflie writes to its memory card: one event, and another without variables now and then."""
+    data = struct.pack("<BHH", 0xBC, version, 2) + struct.pack("<H", 7) + b"fixedFrequency\0"
+    data += struct.pack("<H", len(variables)) + b"".join(name.encode() + b"\0" for name in variables)
+    data += struct.pack("<H", 9) + b"estTDOA\0" + struct.pack("<H", 0)
+    for index, ((time_s, place, _), yaw) in enumerate(zip(pose.rows(), pose.headings_rad, strict=True)):
+        stamp = struct.pack("<Q", round(1e6 * time_s)) if version == 2 else struct.pack("<I", round(1e3 * time_s))
+        data += struct.pack("<H", 7) + stamp + struct.pack("<4f", *place, np.rad2deg(wrap(yaw)))
+        if index % 5 == 0:
+            data += struct.pack("<H", 9) + stamp
+    path = folder / f"{pose.name}.log"
+    path.write_bytes(data + struct.pack("<I", zlib.crc32(data)))
     return path
 
 

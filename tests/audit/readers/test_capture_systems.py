@@ -1,5 +1,6 @@
 """Exports of motion-capture systems: several bodies, gaps, units, axes, and when the capture began."""
 
+import signal
 import struct
 from dataclasses import replace
 from datetime import datetime
@@ -7,8 +8,10 @@ from datetime import datetime
 import numpy as np
 import pytest
 
+from mtm_audit.readers.logs.columns import header_columns
 from mtm_audit.readers.logs.options import ReadOptions
 from mtm_audit.readers.logs.registry import read_log
+from mtm_audit.readers.logs.rigid import grouped
 from mtm_onboard.protocol import MtmError
 from tests.audit.readers.log_writers import CORNERS_M, write_c3d
 from tests.audit.readers.moving_pose import driving
@@ -191,3 +194,32 @@ def test_an_export_of_qualisys_without_motion_says_so(tmp_path, data):
     text = f"NO_OF_FRAMES\t1\nFREQUENCY\t100\nDATA_INCLUDED\t{data}\nMARKER_NAMES\ta\n1.0\n"
     with pytest.raises(MtmError, match="export of Qualisys"):
         read_log(written(tmp_path / "analog.tsv", text))
+
+
+@pytest.mark.parametrize(
+    ("label", "body"),
+    [
+        ("rover:left", "rover"), ("rover_Marker1", "rover"), ("rover_m3", "rover"), ("rover 12", "rover"),
+        ("rover-2", "rover"), ("arm1", "arm"), ("nose", "nose"), ("12", "12"), (":x", ":x"), ("___1", "___1"),
+    ],
+)  # fmt: skip
+def test_the_body_of_a_marker_is_in_its_label(label, body):
+    assert list(grouped([label], {}, "take")) == [body]
+
+
+@pytest.fixture
+def alarm():
+    """An end for what would try all ways to read a text, which takes days."""
+    former = signal.signal(signal.SIGVTALRM, lambda *_: pytest.fail("a minute of work on one label"))
+    signal.setitimer(signal.ITIMER_VIRTUAL, 60.0)
+    yield
+    signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+    signal.signal(signal.SIGVTALRM, former)
+
+
+@pytest.mark.usefixtures("alarm")
+@pytest.mark.parametrize("letter", ["_", "1", "m", " ", ":", "1a"])
+def test_a_long_label_comes_to_an_end(letter):
+    assert len(grouped([letter * 20_000, letter * 20_000 + "1"], {}, "take")) >= 1
+    header = header_columns("time," + "(" * 20_000 + letter * 20_000 + "," + " " * 20_000 + "x")
+    assert [header[0].name, header[-1].name] == ["time", "x"]

@@ -18,6 +18,7 @@ from tests.audit.readers.log_writers import (
     RosMessages,
     late_ns,
     write_c3d,
+    write_card,
     write_dataflash,
     write_foxglove,
     write_rosbag1,
@@ -87,6 +88,15 @@ def test_odometry_after_a_change_of_version_is_read(tmp_path):
     assert np.abs(off).max() < 1e-6
 
 
+def test_damage_in_a_dataflash_log_is_not_printed(tmp_path, capfd):
+    path = write_dataflash(tmp_path, POSE)
+    data = bytearray(path.read_bytes())
+    data[5000:5200] = bytes(200)
+    path.write_bytes(data)
+    assert 280 <= len(read_log(path).tracks[0].times_s) < 301
+    assert capfd.readouterr() == ("", "")
+
+
 def test_each_vehicle_of_a_telemetry_log_is_a_body(tmp_path):
     contents = read_log(write_tlog(tmp_path, POSE, OTHER))
     assert [track.name for track in contents.tracks] == ["system1", "system2"]
@@ -115,6 +125,27 @@ def test_damage_in_a_telemetry_log_costs_what_is_damaged(tmp_path):
 def test_a_log_without_a_position_says_what_to_log(tmp_path):
     path = write_tlog(tmp_path, driving("robot0", seconds=0.4), odometry=True)
     with pytest.raises(MtmError, match="without a position; let the vehicle send LOCAL_POSITION_NED"):
+        read_log(path)
+
+
+def test_a_card_that_was_cut_gives_what_is_whole(tmp_path):
+    path = write_card(tmp_path, POSE)
+    path.write_bytes(path.read_bytes()[:-1000])
+    contents, warnings = warned(path)
+    assert 250 < len(contents.tracks[0].times_s) < 301
+    assert close(contents.tracks[0], POSE)
+    assert ["was cut or damaged" in warning for warning in warnings] == [True]
+
+
+def test_a_card_without_a_position_names_what_it_has(tmp_path):
+    path = write_card(tmp_path, POSE, variables=("acc.x(f)", "acc.y(f)", "acc.z(f)", "pm.vbat(f)"))
+    with pytest.raises(MtmError, match=r"without a position but with acc.x, acc.y, acc.z, pm.vbat"):
+        read_log(path)
+
+
+def test_names_from_a_file_command_no_terminal(tmp_path):
+    path = write_card(tmp_path, POSE, variables=("acc\n.x(f)", "acc\x1b[2J(f)", "a(f)", "b(f)"))
+    with pytest.raises(MtmError, match=r"with a, acc\?.x, acc\?\[2J, b;"):
         read_log(path)
 
 
@@ -318,6 +349,21 @@ def test_a_file_of_a_bag_is_read_by_itself(tmp_path):
     assert close(read_log(path / "robot0.db3").tracks[0], POSE)
 
 
+def test_a_bag_converted_from_ros_1_is_read(tmp_path):
+    from rosbags.convert.converter import convert
+    from rosbags.typesys import Stores, get_typestore
+
+    source, target = write_rosbag1(tmp_path, POSE), tmp_path / "converted"
+    convert(
+        [source], target, dst_storage="sqlite3", dst_version=8, compress=None, compress_mode="none",
+        default_typestore=None, typestore=get_typestore(Stores.ROS2_HUMBLE), exclude_topics=(), include_topics=(),
+        exclude_msgtypes=(), include_msgtypes=(),
+    )  # fmt: skip
+    (track,) = read_log(target).tracks
+    assert track.times_s - UNIX_S == pytest.approx(POSE.times_s, abs=1e-6)
+    assert close(track, POSE)
+
+
 def test_a_plan_is_no_trajectory(tmp_path):
     kind, stamped = "nav_msgs/msg/Path", STAMPED.format("Pose")
     plan = [
@@ -355,6 +401,24 @@ def test_a_cut_bag_of_ros_gives_what_is_whole(tmp_path):
     contents, warnings = warned(path)
     assert len(contents.tracks[0].times_s) > 2000
     assert ["was cut short" in warning for warning in warnings] == [True]
+
+
+def test_transforms_of_foxglove_are_followed(tmp_path):
+    from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+    from mcap_protobuf.writer import Writer
+
+    path = tmp_path / "robot0.mcap"
+    with path.open("wb") as file, Writer(file) as writer:
+        for time_s, place, turn in POSE.rows():
+            message = FrameTransform(parent_frame_id="map", child_frame_id="robot")
+            message.timestamp.FromNanoseconds(nanoseconds(time_s))
+            for value, numbers in ((message.translation, place), (message.rotation, turn)):
+                for axis, number in zip("xyzw", numbers, strict=False):
+                    setattr(value, axis, number)
+            writer.write_message("/moves", message, nanoseconds(time_s), nanoseconds(time_s))
+    contents, warnings = warned(path)
+    assert close(contents.tracks[0], POSE)
+    assert ["robot is followed in the frame map" in warning for warning in warnings] == [True]
 
 
 def test_an_encoding_that_is_not_read_is_named(tmp_path):
