@@ -1,12 +1,12 @@
 """Any recording into tracks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from mtm_audit.ingest.films import film_frames
 from mtm_audit.model.track import Track
 from mtm_audit.readers.motion_capture import read_motion_capture
 from mtm_audit.readers.text import check_readable
-from mtm_audit.readers.video import read_frames
 from mtm_audit.tracking.registry import tracker
 
 VIDEO_SUFFIXES = frozenset(
@@ -41,5 +41,20 @@ def load_tracks(
     """
     if not is_video(path):
         return [read_motion_capture(path)]
+    return film_tracks([path], tracker_name, warn, progress)
+
+
+def film_tracks(
+    files: Sequence[Path],
+    tracker_name: str = "aruco",
+    warn: Callable[[str], None] | None = None,
+    progress: Callable[[int], None] | None = None,
+    frame_rate_hz: float | None = None,
+) -> list[Track]:
+    """Follow what moves in one film, in however many files it came; `frame_rate_hz` replaces their times.
+
+    Otherwise as `load_tracks`.
+    """
     chosen = tracker(tracker_name)
-    return chosen.track(read_frames(path, chosen.pixels, warn), progress)
+    frames = film_frames(files, chosen.pixels, warn or (lambda sentence: None), frame_rate_hz)
+    return chosen.track(frames, progress)

@@ -3,14 +3,13 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from mtm_audit.ingest.films import film_frames, is_picture
-from mtm_audit.ingest.load import load_tracks
+from mtm_audit.ingest.films import is_picture
+from mtm_audit.ingest.load import film_tracks, load_tracks
 from mtm_audit.ingest.source import sources_of
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.recording import Kind, Recording
 from mtm_audit.model.track import Track
 from mtm_audit.readers.video import inspect_video
-from mtm_audit.tracking.registry import tracker as tracker_named
 from mtm_onboard.protocol.errors import MtmError
 
 # Times from here on, the year 2001, count from the Unix epoch.
@@ -43,8 +42,7 @@ def read_recording(
     warnings: list[str] = []
     tracks: list[Track] = []
     if kind == "video":
-        chosen = tracker_named(tracker)
-        tracks = chosen.track(film_frames(files, chosen.pixels, warnings.append, frame_rate_hz), progress)
+        tracks = film_tracks(files, tracker, warnings.append, progress, frame_rate_hz)
     else:
         for file in files:
             tracks += load_tracks(file, tracker, warnings.append, progress)
