@@ -91,11 +91,11 @@ def test_the_search_finds_nothing_for_a_key_that_had_no_part(tracks):
     assert all(0.0 <= fraction <= 1.0 for _, fraction in said)
 
 
-def test_what_can_be_read_at_no_speed_is_refused_for_its_own_reason(tracks):
+def test_what_no_speed_can_read_is_refused_for_its_reason(tracks):
     with pytest.raises(MtmError, match="no more than 10000 s can be searched"):
         decode_at_speeds(slowed(tracks, 1e5), KEY, SETTINGS)
 
 
-def test_the_speeds_are_the_common_ones_between_an_eighth_and_eight():
+def test_the_speeds_reach_from_an_eighth_to_eight():
     assert len(set(SPEEDS)) == len(SPEEDS) == 15
     assert (min(SPEEDS), max(SPEEDS), SPEEDS[0]) == (0.125, 8.0, 1.0)
