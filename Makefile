@@ -112,7 +112,7 @@ deb-test: setup
 compile = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
   --custom-compile-command "make constraints" pyproject.toml --group build
 constraints: $(UV)
-	$(compile) --extra dev --extra worlds --overrides constraints/without_torch.in -o constraints/worlds.txt
+	$(compile) --extra dev --extra worlds --extra parquet --overrides constraints/without_torch.in -o constraints/worlds.txt
 	$(compile) --extra dev -c constraints/worlds.txt -o constraints/dev.txt
 	$(compile) --extra hil -c constraints/worlds.txt -o constraints/hil.txt
 	$(compile) --extra dev --resolution lowest-direct -o constraints/oldest.txt

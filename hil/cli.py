@@ -37,6 +37,14 @@ class WireName(StrEnum):
     DIRECT = "direct"
 
 
+class FloorName(StrEnum):
+    """Keys of `hil.sensors.cameras.FLOORS`."""
+
+    MAT = "mat"
+    CARPET = "carpet"
+    MARKERS = "markers"
+
+
 class CameraName(StrEnum):
     """Keys of `hil.sensors.cameras.CAMERAS`, repeated so that --help need not load OpenCV."""
 
@@ -69,10 +77,21 @@ def record(
     key: KeyFile = None,
     wire: Annotated[WireName, typer.Option(help="CAN, plaintext or MAVLink protocol, or no wire.")] = WireName.CAN,
     seed: WorldSeed = 0,
+    plant: Annotated[
+        str, typer.Option(metavar="NAME", help="Kind of the robots, see mtm-hil bench --plants; or a plant file.")
+    ] = "robomaster",
     camera: Annotated[CameraName, typer.Option(help="Which camera films.")] = CameraName.OVERHEAD,
     quality: Annotated[
         QualityName | None, typer.Option(help="Encode the film as these do; nearly lossless without.")
     ] = None,
+    shake_px: Annotated[
+        float, typer.Option(min=0.0, max=100.0, help="How far a hand shakes the camera, rms in pixels below 3 Hz.")
+    ] = 0.0,
+    pan_deg: Annotated[float, typer.Option(min=-60.0, max=60.0, help="How far the camera pans while it films.")] = 0.0,
+    roll_deg: Annotated[float, typer.Option(min=0.0, max=45.0, help="How far the camera rolls to and fro.")] = 0.0,
+    floor: Annotated[
+        FloorName, typer.Option(help="A faint mat, a carpet, or a mat with markers on it.")
+    ] = FloorName.MAT,
     no_video: Annotated[bool, typer.Option("--no-video", help="Motion capture alone.")] = False,
     realtime: Annotated[
         bool, typer.Option("--realtime", help="Run the onboard programs in processes of their own, on real ports.")
@@ -81,9 +100,14 @@ def record(
     """Record four simulated robots: motion capture, video, and what was sent."""
     require_message_or_none(message, no_message)
     with reported_console() as console:
+        from math import radians
+
         from hil.commands.record import RecordOptions
         from hil.commands.record import record as run
+        from hil.sensors.camera_motion import CameraMotion
 
+        moves = bool(shake_px or pan_deg or roll_deg)
+        motion = CameraMotion(shake_px=shake_px, pan_rad=radians(pan_deg), roll_rad=radians(roll_deg))
         film = None if no_video else camera.value
         run(
             RecordOptions(
@@ -96,6 +120,9 @@ def record(
                 camera=film,
                 realtime=realtime,
                 quality=None if quality is None else quality.value,
+                motion=motion if moves else None,
+                floor=floor.value,
+                plant=plant,
             ),
             console,
         )

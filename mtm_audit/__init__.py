@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from mtm_audit.decoding.settings import DecodeSettings
     from mtm_audit.model.recorded_at import RecordedAt
     from mtm_audit.model.track import Track
+    from mtm_audit.readers.logs.options import ReadOptions
     from mtm_audit.significance.evidence import Evidence
     from mtm_onboard.protocol.errors import MtmError
     from mtm_onboard.protocol.key import Key, load_key
@@ -21,6 +22,7 @@ __all__ = [
     "Evidence",
     "Key",
     "MtmError",
+    "ReadOptions",
     "RecordedAt",
     "Track",
     "decode",
@@ -36,6 +38,7 @@ _MODULES = {
     "Evidence": "mtm_audit.significance.evidence",
     "Key": "mtm_onboard.protocol.key",
     "MtmError": "mtm_onboard.protocol.errors",
+    "ReadOptions": "mtm_audit.readers.logs.options",
     "RecordedAt": "mtm_audit.model.recorded_at",
     "Track": "mtm_audit.model.track",
     "decode": "mtm_audit.decoding.files",

@@ -8,11 +8,14 @@ import os
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mtm_audit.commands.errors import reported
+
+if TYPE_CHECKING:
+    from mtm_audit.readers.logs.options import ReadOptions
 
 app = typer.Typer(
     help="Find out what a robot said with its motion: from a recording and a key to a verdict.",
@@ -20,9 +23,26 @@ app = typer.Typer(
 )  # fmt: skip
 
 _TRACKER_HELP = (
-    "How to find robots in a video: aruco, colour:NAME,..., brightness:X0,Y0,X1,Y1, arms:INNER,OUTER, football or "
-    "flow:X0,Y0,X1,Y1 (pixels from the upper left corner)."
+    "How to find robots in a video: aruco or aruco:6x6_250, colour:NAME,..., brightness:X0,Y0,X1,Y1, "
+    "arms:INNER,OUTER, football or flow:X0,Y0,X1,Y1 (pixels from the upper left corner)."
 )
+
+
+# How to read a log; what they mean is in docs/formats.md.
+_Topics = Annotated[
+    list[str] | None,
+    typer.Option("--topic", metavar="NAME", help="What to read of a log that holds several poses; may be repeated."),
+]
+_Bodies = Annotated[
+    list[str] | None,
+    typer.Option("--body", metavar="NAME=MARKER,...", help="The markers of a rigid body; may be repeated."),
+]
+_Unit = Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of a log's positions: m, cm, mm, in or ft.")]
+_TimeUnit = Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of a log's times: s, ms, us or ns.")]
+_Up = Annotated[str | None, typer.Option(metavar="AXIS", help="Axis of a log that points up: z, y, -y and so on.")]
+_ArrivalTimes = Annotated[
+    bool, typer.Option("--arrival-times", help="Take when messages were recorded, not the times that they carry.")
+]
 
 
 class StrategyName(StrEnum):
@@ -54,13 +74,27 @@ def _every_command(
 def decode(
     paths: Annotated[
         list[Path],
-        typer.Argument(metavar="PATH", help="Videos, motion-capture files, or a folder of those or of pictures."),
+        typer.Argument(metavar="PATH", help="Videos, logs, motion-capture files, or a folder of those or of pictures."),
     ],
-    key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
+    key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The key file, unless --anchor and --disclosed are given.")
+    ] = None,
+    anchor: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A fleet's public anchor, to verify with a disclosed key.")
+    ] = None,
+    disclosed: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The disclosed key of the day on which the film was made.")
+    ] = None,
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
     tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
+    reference: Annotated[
+        str,
+        typer.Option(
+            metavar="TRACK,...", help="Tracks that stand still, such as markers on the floor (default: found)."
+        ),
+    ] = "",
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
@@ -100,8 +134,23 @@ def decode(
         typer.Option(metavar="TIME", help="When the recording began (2026-01-31T12:00:00Z), for a rolling schedule."),
     ] = None,
     at_error: Annotated[
-        float, typer.Option(min=0.0, max=60.0, metavar="SECONDS", help="How far that time may be off.")
+        float,
+        typer.Option(
+            min=0.0,
+            max=60.0,
+            metavar="SECONDS",
+            help="How far that time may be off; 2 when both clocks are synchronised.",
+        ),
     ] = 30.0,
+    topic: _Topics = None,
+    body: _Bodies = None,
+    unit: _Unit = None,
+    time_unit: _TimeUnit = None,
+    up: _Up = None,
+    arrival_times: _ArrivalTimes = False,
+    revoked: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Key files no longer trusted, as mtm-onboard revoke lists them.")
+    ] = None,
 ) -> None:
     """Decode the message in a recording.
 
@@ -109,30 +158,39 @@ def decode(
     """  # fmt: skip
     if search_speed and speed is not None:
         raise typer.BadParameter("is given; leave it or --search-speed out", param_hint="--speed")
+    if (key is None) == (anchor is None and disclosed is None) or (anchor is None) != (disclosed is None):
+        raise typer.BadParameter("give a key file, or else an anchor and a disclosed key", param_hint="--key")
     onset_s, pairs, at_unix_s = _onset_s(onset), _pairs(assign or []), _unix_s(at)
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.decode import DecodeOptions, run_decode
+        from mtm_audit.commands.opened_key import KeySource
         from mtm_audit.decoding.settings import DecodeSettings
         from mtm_audit.detectors.matched.profile import load_profile
         from mtm_audit.model.recorded_at import RecordedAt
+        from mtm_onboard.protocol.revocation import RevocationList, load_revocations
 
         known = None if profile is None else load_profile(profile)
         recorded = None if at_unix_s is None else RecordedAt(at_unix_s, at_error)
         settings = DecodeSettings(
             detector=detector, onset_s=onset_s, decoys=decoys, threshold=threshold, assignment=pairs, profile=known,
-            at=recorded,
+            at=recorded, revoked=RevocationList() if revoked is None else load_revocations(revoked),
         )  # fmt: skip
+        reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
         played = None if search_speed else 1.0 if speed is None else speed
         code = run_decode(
-            DecodeOptions(tuple(paths), key, tracker, settings, as_json, plot, explain, frame_rate, played)
-        )
+            DecodeOptions(
+                paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker,
+                reference=_names(reference), settings=settings, as_json=as_json, plot=plot, explain=explain,
+                reading=reading, frame_rate_hz=frame_rate, speed=played,
+            )
+        )  # fmt: skip
     raise typer.Exit(code)
 
 
 @app.command("profile")
 def learn_profile(
     paths: Annotated[
-        list[Path], typer.Argument(metavar="PATH", help="A video, motion-capture files, or a folder of those.")
+        list[Path], typer.Argument(metavar="PATH", help="A video, logs or motion-capture files, or a folder of those.")
     ],
     key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
     out: Annotated[Path, typer.Option(metavar="FILE.profile", help="Where to write what was learnt.")],
@@ -140,9 +198,21 @@ def learn_profile(
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
     tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
+    reference: Annotated[
+        str,
+        typer.Option(
+            metavar="TRACK,...", help="Tracks that stand still, such as markers on the floor (default: found)."
+        ),
+    ] = "",
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
+    topic: _Topics = None,
+    body: _Bodies = None,
+    unit: _Unit = None,
+    time_unit: _TimeUnit = None,
+    up: _Up = None,
+    arrival_times: _ArrivalTimes = False,
 ) -> None:
     """Learn how a type of robot follows commands from a recording that decodes, for shorter ones of it.
 
@@ -154,12 +224,16 @@ def learn_profile(
         from mtm_audit.decoding.settings import DecodeSettings
 
         settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
-        run_profile(ProfileOptions(tuple(paths), key, out, tracker, settings))
+        reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        run_profile(ProfileOptions(tuple(paths), key, out, tracker, _names(reference), settings, reading))
 
 
 @app.command("journal")
 def show_journal(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="The journal that mtm-onboard run wrote.")],
+    key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The run's key, which makes the noise again that is left out.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="Draw commands and lateness (.png, .pdf, .svg).")
@@ -169,7 +243,7 @@ def show_journal(
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.journal import run_journal
 
-        run_journal(path, as_json=as_json, plot=plot)
+        run_journal(path, as_json=as_json, plot=plot, key=key)
 
 
 @app.command()
@@ -265,6 +339,10 @@ def _unix_s(text: str | None) -> float | None:
     return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()
 
 
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
 def _pairs(texts: Sequence[str]) -> dict[str, str]:
     pairs: dict[str, str] = {}
     for text in texts:
@@ -275,6 +353,23 @@ def _pairs(texts: Sequence[str]) -> dict[str, str]:
             raise typer.BadParameter(f"{body!r} is given two tracks; give it one", param_hint="--assign")
         pairs[body] = track
     return pairs
+
+
+def _reading(
+    topics: Sequence[str] | None,
+    bodies: Sequence[str] | None,
+    unit: str | None,
+    time_unit: str | None,
+    up: str | None,
+    *,
+    arrival_times: bool,
+) -> "ReadOptions":
+    from mtm_audit.readers.logs.options import ReadOptions, marker_groups
+
+    return ReadOptions(
+        unit=unit, time_unit=time_unit, up=up, topics=tuple(topics or ()), bodies=marker_groups(bodies or ()),
+        arrival_times=arrival_times,
+    )  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -10,6 +10,10 @@ from importlib import import_module
 # Each module has `add_parser(subparsers)`, which sets `handler(args) -> int`, and imports what it needs only in there.
 _COMMANDS = (
     "mtm_onboard.commands.keygen",
+    "mtm_onboard.commands.issue",
+    "mtm_onboard.commands.anchor",
+    "mtm_onboard.commands.disclose",
+    "mtm_onboard.commands.revoke",
     "mtm_onboard.commands.show",
     "mtm_onboard.commands.doctor",
     "mtm_onboard.commands.run",

@@ -1,12 +1,20 @@
 """The command lines of `mtm-hil`'s experiments; what each does is loaded when it is asked for."""
 
 from collections.abc import Callable
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from hil.commands.options import CELLS_FOLDER, Cells, CellSeed, FirstSeed, OutCsv, Workers, reported_console
+
+
+class FrameName(StrEnum):
+    """Where the noise of a message lives; in step with `hil.experiments.real.added.Frame`."""
+
+    WORLD = "world"
+    BODY = "body"
 
 
 def calibrate(
@@ -22,16 +30,32 @@ def calibrate(
 
 
 def bench(
+    *,
     rollouts: Annotated[int, typer.Option(min=1, help="Rollouts of the main conditions; slow ones take fewer.")] = 200,
     quick: Annotated[
         bool, typer.Option("--quick", help="A few rollouts of some conditions, for a first look.")
     ] = False,
+    plants: Annotated[
+        str | None,
+        typer.Option(metavar="NAMES", help="Other robots instead: all, or names and plant files parted by commas."),
+    ] = None,
+    ticks: Annotated[int, typer.Option(min=10, help="With --plants: window of a symbol.")] = 100,
     out: OutCsv = None,
     plot: Annotated[Path | None, typer.Option(help="A picture to draw: accuracy over the window length.")] = None,
     cells: Cells = CELLS_FOLDER / "bench.jsonl",
 ) -> None:
     """Compare the paper's detector and ours with the genie, an oracle, on the same recordings."""
+    if plants is not None and (quick or plot is not None):
+        raise typer.BadParameter("--quick and --plot do not go with --plants; take fewer --rollouts for a first look")
     with reported_console() as console:
+        if plants is not None:
+            from hil.commands.bench_plants import PlantsOptions, bench_plants
+            from hil.experiments.plants.rollout import PlantJob
+
+            job = PlantJob(ticks=ticks)
+            asked = PlantsOptions(plants=plants, job=job, rollouts=rollouts, out=out, cells=cells)
+            bench_plants(asked, console)
+            return
         from hil.commands.bench import BenchOptions
         from hil.commands.bench import bench as run
 
@@ -63,6 +87,20 @@ def messages(
     """Count how many framed messages are received: whole, with a known time, and through occlusions."""
     with reported_console() as console:
         from hil.commands.messages import messages as run
+
+        run(rollouts, seed, workers, out, cells, console)
+
+
+def cameras(
+    rollouts: Annotated[int, typer.Option("-n", min=1, help="Runs that each camera films.")] = 2,
+    seed: CellSeed = 900_000,
+    workers: Workers = None,
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "cameras.jsonl",
+) -> None:
+    """Measure the evidence left by a camera that shakes, pans and rolls, and by markers at an angle."""
+    with reported_console() as console:
+        from hil.commands.cameras import cameras as run
 
         run(rollouts, seed, workers, out, cells, console)
 
@@ -152,6 +190,83 @@ def sweep(
         run(options, console)
 
 
+def real(
+    folder: Annotated[Path, typer.Argument(help="Recorded trajectories without a message: TUM or CSV files.")],
+    *,
+    messages: Annotated[int, typer.Option("-n", min=1, help="Messages on each recording, frame and sigma.")] = 2,
+    frame: Annotated[
+        list[FrameName] | None, typer.Option(help="Where the noise lives; may be repeated (default: both).")
+    ] = None,
+    sigma: Annotated[
+        list[float] | None, typer.Option(min=1e-4, max=10.0, help="Noise in m/s; may be repeated (default: 0.1).")
+    ] = None,
+    alphabet: Annotated[int, typer.Option(metavar="M", min=2, help="Alphabet size.")] = 8,
+    window: Annotated[float, typer.Option(metavar="SECONDS", min=0.1, help="Length of a symbol.")] = 4.0,
+    seconds: Annotated[float, typer.Option(min=1.0, help="Length of the piece of each recording.")] = 48.0,
+    band: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Band of the noise in Hz.")] = "0.5:4",
+    threshold: Annotated[float, typer.Option(min=1e-12, max=1.0, help="How often a verdict may be wrong.")] = 1e-4,
+    onset_known: Annotated[bool, typer.Option("--onset-known", help="Tell the decode when the message began.")] = False,
+    seed: FirstSeed = 800_000,
+    workers: Workers = None,
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "real.jsonl",
+) -> None:
+    """Add messages to recorded motion, through plants drawn at random, and decode it."""
+    with reported_console() as console:
+        from hil.commands.real import RealOptions, band_of
+        from hil.commands.real import real as run
+
+        options = RealOptions(
+            folder=folder,
+            messages=messages,
+            frames=tuple(name.value for name in frame or FrameName),
+            sigmas=tuple(sigma or (0.1,)),
+            alphabet_size=alphabet,
+            window_s=window,
+            seconds=seconds,
+            band_hz=band_of(band),
+            threshold=threshold,
+            onset_known=onset_known,
+            seed=seed,
+            workers=workers,
+            out=out,
+            cells=cells,
+        )
+        run(options, console)
+
+
+def identify(
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="COMMANDS TRUTH", help="What was commanded and how the robot moved, for each robot."),
+    ],
+    *,
+    offset: Annotated[
+        float, typer.Option(metavar="SECONDS", help="Added to the commands' times, such as when a journal begins.")
+    ] = 0.0,
+    plant: Annotated[Path | None, typer.Option(help="A plant file to write, for bench --plants and record.")] = None,
+    profile: Annotated[Path | None, typer.Option(help="A profile to write, for mtm-audit decode.")] = None,
+    summary: Annotated[str, typer.Option(help="What kind of robot it is, for the plant file.")] = "identified",
+    source: Annotated[str, typer.Option(help="Where the logs come from, for the plant file.")] = "",
+    out: OutCsv = None,
+) -> None:
+    """Measure how a robot follows its commands, from what was commanded and how it moved."""
+    with reported_console() as console:
+        from hil.commands.identify import IdentifyOptions
+        from hil.commands.identify import identify as run
+
+        options = IdentifyOptions(
+            files=tuple(files),
+            offset_s=offset,
+            summary=summary,
+            source=source,
+            plant=plant,
+            profile=profile,
+            out=out,
+        )
+        run(options, console)
+
+
 def faults(
     seeds: Annotated[int, typer.Option("-n", min=1, help="Runs of each combination of wire, fault and loss.")] = 3,
     seed: Annotated[int, typer.Option(min=0, help="The first run's seed.")] = 0,
@@ -197,5 +312,6 @@ def endurance(
 
 # In the order in which --help lists them.
 EXPERIMENTS: tuple[Callable[..., None], ...] = (
-    calibrate, bench, false_alarms, messages, frames, shim, robustness, sweep, faults, fuzz, endurance,
+    calibrate, bench, cameras, false_alarms, messages, frames, shim, robustness, sweep, real, identify, faults, fuzz,
+    endurance,
 )  # fmt: skip

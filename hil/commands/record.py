@@ -1,10 +1,11 @@
 """`mtm-hil record`: drive the simulated robots and record them."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
@@ -13,14 +14,19 @@ from hil.commands.new_folder import new_folder
 from hil.fleet.lockstep import run_lockstep
 from hil.fleet.realtime import START_S, run_realtime
 from hil.fleet.recording import Sensors, write_recording
-from hil.fleet.rig import RobotReport, RunSettings, Wire
-from hil.sensors.cameras import CAMERAS
+from hil.fleet.rig import ChassisFactory, RobotReport, RunSettings, Wire
+from hil.plants.family import ROBOMASTER
+from hil.plants.robots import SteppedRobot
+from hil.sensors.camera_motion import CameraMotion
+from hil.sensors.cameras import CAMERAS, FLOORS
 from hil.sensors.film_qualities import FILM_QUALITIES
 from hil.worlds.robomaster import fleet_scheme
-from mtm_onboard.protocol import generate_key, load_key, save_key
+from hil.worlds.vehicles import arena_task, vehicle
+from mtm_onboard.protocol import Scheme, generate_key, load_key, save_key
 from mtm_onboard.protocol.framing import symbols_of_number
 
 KEY_NAME = "robot.key"
+_STREAM = 731
 # From the start of the recording to the message's, in simulated time.
 LEAD_S = 1.5
 
@@ -30,9 +36,9 @@ class RecordOptions:
     """What the command line asked for.
 
     `message` None moves the robots without one, `key` None makes a key, `camera` None films nothing, `quality` None
-    keeps the film nearly as the camera saw it. `realtime` runs
+    keeps the film nearly as the camera saw it, and `plant` is the kind of the robots. `realtime` runs
     the onboard programs on UARTs when `wire` is plaintext, over UDP when it is MAVLink and on serial CAN adapters
-    otherwise.
+    otherwise. `motion` None is a camera on a stand; `floor` is one of `FLOORS`.
     """
 
     out: Path
@@ -44,16 +50,21 @@ class RecordOptions:
     camera: str | None
     realtime: bool
     quality: str | None = None
+    motion: CameraMotion | None = None
+    floor: str = "mat"
+    plant: str = ROBOMASTER
 
 
 def record(options: RecordOptions, console: Console) -> None:
     """Write the recording folder, whole or not at all; raises MtmError when it exists or an option does not fit."""
-    key = generate_key("hil", fleet_scheme()) if options.key is None else load_key(options.key)
+    work, chassis = arena_task(options.plant), _chassis(options.plant)
+    key = generate_key("hil", _scheme(options.plant)) if options.key is None else load_key(options.key)
     framed = key.scheme.framing is not None
     symbols = None if options.message is None or framed else symbols_of_number(options.message, key.scheme)
     sensors = Sensors(
-        camera=None if options.camera is None else CAMERAS[options.camera],
+        camera=None if options.camera is None else replace(CAMERAS[options.camera], motion=options.motion),
         quality=None if options.quality is None else FILM_QUALITIES[options.quality],
+        scene=FLOORS[options.floor],
     )
     settings = RunSettings(
         key=key,
@@ -65,6 +76,8 @@ def record(options: RecordOptions, console: Console) -> None:
         payload=options.message if framed else None,
         # A rolling schedule needs a time of day, and a recording made now has this one.
         unix_s=time.time() if key.scheme.schedule == "rolling" and not options.realtime else None,
+        task=work,
+        chassis=chassis,
     )
     with new_folder(options.out) as folder:
         if options.key is None:
@@ -83,10 +96,28 @@ def record(options: RecordOptions, console: Console) -> None:
         console.print(_robots_table(result.robots))
 
 
+def _scheme(plant: str) -> Scheme:
+    """The fleet's scheme, its noise on the axes of that kind of robot."""
+    usual, axes = fleet_scheme(), vehicle(plant).kind.axes
+    return replace(usual, channels=tuple(replace(channel, axes=axes) for channel in usual.channels))
+
+
+def _chassis(plant: str) -> ChassisFactory | None:
+    """Robots of the kind, each drawn from its own seed; None for the calibrated one, which is the rig's own."""
+    if plant == ROBOMASTER:
+        return None
+    kind = vehicle(plant).kind
+    return lambda seed, place: SteppedRobot(kind.draw(np.random.default_rng([_STREAM, seed])), seed, place)
+
+
 def _print_summary(options: RecordOptions, settings: RunSettings) -> None:
     sent = "no message" if options.message is None else f"message {options.message}, from {settings.onset_s:.4g} s on"
     print(f"{options.out}: {options.seconds:g} s of motion, {sent}")
     scheme = settings.key.scheme
+    axes = vehicle(options.plant).kind.axes
+    if options.message is not None and scheme.channels[0].axes != axes:
+        print(f"the key's noise is on {', '.join(scheme.channels[0].axes)}; {options.plant} carries it on "
+              f"{', '.join(axes)}")  # fmt: skip
     if settings.unix_s is not None:
         began = datetime.fromtimestamp(settings.unix_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
         print(f"it began at {began}; decode it with --at {began} --at-error 1")

@@ -10,12 +10,11 @@ import numpy as np
 from hil.fleet.clock import AnsweringClock, SimulatedClock
 from hil.fleet.direct import DirectLink
 from hil.fleet.rig import LIMITS, SAMPLE_PERIOD_S, RobotReport, RunResult, RunSettings, Wire, seeds_of
-from hil.plants.mecanum import MecanumPlant
 from hil.sensors.poses import Floats, Trajectory
 from hil.vehicles.can_node import CanMotionController
 from hil.vehicles.mavlink_firmware import COPTER
 from hil.vehicles.mavlink_vehicle import MavlinkVehicle
-from hil.vehicles.motion_controller import MotionController
+from hil.vehicles.motion_controller import MotionController, Plant
 from hil.vehicles.plaintext_node import PlaintextMotionController
 from hil.wires.byte_pipe import PipeEnd, byte_pipe
 from hil.wires.can_line import can_line
@@ -54,7 +53,7 @@ class _Link:
 @dataclass(frozen=True, kw_only=True)
 class _Robot:
     name: str
-    plant: MecanumPlant
+    plant: Plant
     controller: MotionController
     link: _Link
     task: Task
@@ -155,7 +154,7 @@ def _robot(
     slip_seed: int,
     route: Route,
 ) -> _Robot:
-    plant = MecanumPlant(settings.plant, slip_seed, route.start_xy_m)
+    plant = settings.new_chassis(slip_seed, route.start_xy_m)
     controller, link = _wired(settings.wire, plant, clock)
     source = HeldSource()
     period_s = 1.0 / settings.key.scheme.rate_hz
@@ -182,7 +181,7 @@ def _modulator(settings: RunSettings, channel: Channel, message: Message) -> Noi
     return settings.modulator(codebook, channel.name, own)
 
 
-def _wired(wire: Wire, plant: MecanumPlant, clock: SimulatedClock) -> tuple[MotionController, _Link]:
+def _wired(wire: Wire, plant: Plant, clock: SimulatedClock) -> tuple[MotionController, _Link]:
     if wire == "plaintext":
         controller = MotionController(plant, deadman_s=None)  # as the robot has none on this wire
         return controller, _plaintext_link(controller)

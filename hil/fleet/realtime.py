@@ -16,9 +16,9 @@ import numpy as np
 from hil.fleet.onboard_process import OnboardProcess
 from hil.fleet.rig import SAMPLE_PERIOD_S, RunResult, RunSettings, seeds_of
 from hil.fleet.serial_wires import serial_wire
-from hil.plants.mecanum import MecanumPlant
 from hil.sensors.poses import Trajectory
-from hil.worlds.robomaster import GoToGoal, routes
+from hil.vehicles.motion_controller import Plant
+from hil.worlds.robomaster import Task, routes
 from mtm_onboard.model.clock import SystemClock
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
@@ -40,8 +40,8 @@ class _Robot:
     """One simulated robot, its task controller, and the program that drives it."""
 
     poll: Callable[[float], None]
-    plant: MecanumPlant
-    task: GoToGoal
+    plant: Plant
+    task: Task
     process: OnboardProcess
     client: BaseCommandClient
 
@@ -125,7 +125,10 @@ def _drive(
 
 
 def _arguments(settings: RunSettings, key_file: Path, start_unix_s: float) -> list[str]:
+    # Robots and recording are of one computer, so that its clock need not be right.
+    lab = ["--allow-unsynchronised"] if settings.key.scheme.schedule == "rolling" else []
     return [
+        *lab,
         "--key", str(key_file.resolve()), *_content(settings), "--start-at", f"{start_unix_s:.6f}",
         "--duration", f"{settings.seconds - settings.start_s:.6f}",
     ]  # fmt: skip
@@ -147,12 +150,12 @@ def _robots(settings: RunSettings, arguments: list[str], folder: Path, stack: Ex
     for channel, slip, route in zip(
         settings.key.scheme.channels, seeds.slips, routes(seeds.permutation()), strict=True
     ):
-        plant = MecanumPlant(settings.plant, slip, route.start_xy_m)
+        plant = settings.new_chassis(slip, route.start_xy_m)
         wire = serial_wire(settings.wire, plant)
         stack.callback(wire.shutdown)
         process = OnboardProcess(folder, channel.body, channel.name, wire, arguments)
         stack.callback(process.end)
         client = BaseCommandClient(process.udp_port)
         stack.callback(client.close)
-        robots.append(_Robot(wire.poll, plant, GoToGoal(route), process, client))
+        robots.append(_Robot(wire.poll, plant, settings.task(route, slip), process, client))
     return robots

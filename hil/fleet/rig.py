@@ -9,8 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hil.plants.mecanum import MecanumParameters, calibrated_parameters
+from hil.plants.mecanum import MecanumParameters, MecanumPlant, calibrated_parameters
 from hil.sensors.poses import Trajectory
+from hil.vehicles.motion_controller import Plant
 from hil.worlds.robomaster import ROBOTS, TaskFactory, go_to_goal, random_permutation
 from mtm_onboard.protocol import Codebook, Key, MtmError
 from mtm_onboard.protocol.framing import Payload
@@ -23,6 +24,8 @@ from mtm_onboard.runtime.tick import NoiseAdder
 Wire = Literal["can", "plaintext", "mavlink", "direct"]
 # Codebook, channel name and, as `Modulator` takes them, the channel's own symbols or a message that changes them.
 ModulatorFactory = Callable[[Codebook, str, Any], NoiseAdder]
+# From a robot's seed and the place where it starts.
+ChassisFactory = Callable[[int, tuple[float, float]], Plant]
 
 SAMPLE_PERIOD_S = 0.01
 LIMITS = Limits(speed_mps=1.0, turn_rate_radps=2.0)
@@ -36,8 +39,9 @@ class RunSettings:
     without one. The run begins at `unix_s`, and under the rolling schedule its message with the first slot from
     `start_s` on, see `onset_s`; None has slot 0 begin at `start_s`. `wire` "can" is the whole CAN protocol in both
     directions, "direct" gives the same motion without it, and "plaintext" is the EP's text protocol, which rounds
-    commands. `modulator` may put something else, such as the C shim, in the place of the Python one, and `task` other
-    work in the place of the paper's. Raises MtmError when the key does not fit this world or the spans make no sense.
+    commands. `modulator` may put something else, such as the C shim, in the place of the Python one, `task` other work
+    in the place of the paper's, and `chassis` another robot in the place of the mecanum one that `plant` describes.
+    Raises MtmError when the key does not fit this world or the spans make no sense.
     """
 
     key: Key
@@ -51,6 +55,7 @@ class RunSettings:
     payload: Payload | None = None
     unix_s: float | None = None
     task: TaskFactory = go_to_goal
+    chassis: ChassisFactory | None = None
 
     def __post_init__(self) -> None:
         scheme = self.key.scheme
@@ -85,6 +90,12 @@ class RunSettings:
         if self.key.scheme.schedule == "fixed" or self.unix_s is None:
             return self.start_s
         return slot_start_unix_s(self.first_slot, self.key.scheme) - self.unix_s
+
+    def new_chassis(self, seed: int, position_xy_m: tuple[float, float]) -> Plant:
+        """One robot's chassis, which stands there with heading zero."""
+        if self.chassis is not None:
+            return self.chassis(seed, position_xy_m)
+        return MecanumPlant(self.plant, seed, position_xy_m)
 
     def message(self) -> Message | None:
         """What the robots send; raises MtmError when the scheme does not carry it."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.sensors import textures
+from hil.sensors.camera_motion import CameraMotion
 from hil.sensors.optics import Optics, overhead
 from hil.sensors.poses import Floats, Occlusion, Trajectory, common_span_s, occluded
 from hil.sensors.scene import Painter, Scene, Sighting
@@ -24,7 +25,8 @@ class Camera:
     Frames come every 1 / `rate_hz`, moved by Gaussian `jitter_s` (cut at 0.45 periods) and lost with
     `drop_probability`; a frame's time is the middle of its exposure. `exposure_s` above zero blurs motion as the mean
     of `sub_exposures`. `blur_px` is the lens' Gaussian blur, `noise_levels` the sensor's noise, both standard
-    deviations. A robot inside one of `occlusions` (world time) is hidden under a cloth.
+    deviations. A robot inside one of `occlusions` (world time) is hidden under a cloth. `motion` None is a camera on a
+    stand.
     """
 
     optics: Optics = field(default_factory=overhead)
@@ -36,6 +38,7 @@ class Camera:
     blur_px: float = 0.0
     noise_levels: float = 0.0
     occlusions: tuple[Occlusion, ...] = ()
+    motion: CameraMotion | None = None
 
 
 def frame_times(camera: Camera, duration_s: float, rng: np.random.Generator) -> Floats:
@@ -73,11 +76,30 @@ def film(
     instants_s = first_s + (times_s[:, None] + shutter_s).ravel()
     poses = [np.column_stack(robot.at(instants_s)).reshape(-1, len(shutter_s), 3) for robot in trajectories]
     hidden = [occluded(camera.occlusions, robot.name, first_s + times_s) for robot in trajectories]
+    aims = None
+    if camera.motion is not None:
+        aims = camera.motion.turned(camera.optics, instants_s - first_s, last_s - first_s, rng)
     for index, time_s in enumerate(times_s):
         sightings = [
             Sighting(cloth if hidden[number][index] else top, poses[number][index]) for number, top in enumerate(tops)
         ]
-        yield Frame(float(time_s), _with_noise(painter.paint(sightings), noise, rng))
+        if aims is None:
+            picture = painter.paint(sightings)
+        else:
+            own = slice(index * len(shutter_s), (index + 1) * len(shutter_s))
+            picture = _exposed_in_motion(painter, sightings, aims[own])
+        yield Frame(float(time_s), _with_noise(picture, noise, rng))
+
+
+def _exposed_in_motion(painter: Painter, sightings: list[Sighting], aims: list[Optics]) -> Image:
+    """The mean of what each part of the exposure shows."""
+    layers = []
+    for part, optics in enumerate(aims):
+        painter.aim(optics)
+        layers.append(painter.paint([Sighting(one.top, one.poses[part : part + 1]) for one in sightings]))
+    if len(layers) == 1:
+        return layers[0]
+    return np.asarray(np.mean(layers, axis=0, dtype=np.float32) + 0.5, dtype=np.uint8)
 
 
 def top_pixels(optics: Optics, positions_xy_m: Floats) -> Floats:

@@ -1,7 +1,8 @@
-"""The cameras that a recording can be made with, by name."""
+"""The cameras and the floors that a recording can be made with, by name."""
 
 from hil.sensors.camera import Camera
 from hil.sensors.optics import Optics, overhead
+from hil.sensors.scene import Scene
 
 _TILTED = Optics(
     position_m=(0.6, -4.6, 4.4),
@@ -11,6 +12,10 @@ _TILTED = Optics(
     height_px=960,
     radial=(-0.05, 0.0),
 )
+
+# Numbers far from the robots' own, near the corners of the arena.
+FLOOR_MARKERS = ((40, -1.6, -1.6), (41, 1.6, -1.6), (42, -1.6, 1.6), (43, 1.6, 1.6))
+FLOORS = {"mat": Scene(), "carpet": Scene(floor="carpet"), "markers": Scene(floor_markers=FLOOR_MARKERS)}
 
 CAMERAS: dict[str, Camera] = {
     # Fixed under the ceiling, as a tracking system's would be.

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from hil.sensors.poses import Floats
 from mtm_onboard.protocol.errors import MtmError
@@ -16,8 +17,9 @@ class Optics:
     `position_m` and `target_m` are points of the world frame (z up); the picture's upper edge points to +z, or to
     +y when the camera looks straight down, before it is turned clockwise by `roll_rad`. A ray at the distance r from
     the axis (r = 1 at 45 degrees) lands at `focal_px` * r * (1 + k1 r^2 + k2 r^4), with `radial` = (k1, k2), which
-    must keep that increasing within the picture. `mirrored` swaps left and right. Pixel centres have whole
-    coordinates, x to the right and y down.
+    must keep that increasing within the picture. `mirrored` swaps left and right. `turn_rad` turns the camera from
+    that aim: a rotation vector about its own axes whose first angle pans to the right, the second tilts down and the
+    third rolls clockwise. Pixel centres have whole coordinates, x to the right and y down.
     """
 
     position_m: tuple[float, float, float]
@@ -28,6 +30,7 @@ class Optics:
     roll_rad: float = 0.0
     radial: tuple[float, float] = (0.0, 0.0)
     mirrored: bool = False
+    turn_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         if self.position_m == self.target_m:
@@ -43,7 +46,9 @@ class Optics:
         right = right / np.linalg.norm(right)
         down = np.cross(forward, right)
         cos, sin = np.cos(self.roll_rad), np.sin(self.roll_rad)
-        return np.stack([cos * right + sin * down, cos * down - sin * right, forward])
+        aimed = np.stack([cos * right + sin * down, cos * down - sin * right, forward])
+        pan, tilt, roll = self.turn_rad
+        return np.asarray(Rotation.from_rotvec([tilt, -pan, -roll]).as_matrix() @ aimed)
 
     def project(self, points_m: Floats) -> Floats:
         """Pixels (n, 2) of world points (n, 3), which must lie in front of the camera."""
@@ -61,17 +66,28 @@ class Optics:
 
         Shape (height, width, 2); NaN where the pixel looks past the plane.
         """
+        slopes = self.slopes()
+        rays = np.concatenate([slopes, np.ones_like(slopes[..., :1])], axis=-1) @ self.rotation
+        drop = height_m - self.position_m[2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = np.where(drop / rays[..., 2] > 0, drop / rays[..., 2], np.nan)
+        return np.asarray(np.asarray(self.position_m)[:2] + rays[..., :2] * distance[..., None], dtype=np.float64)
+
+    def slopes(self) -> Floats:
+        """Of every pixel's ray, in the frame of the camera: right and down by depth, shape (height, width, 2)."""
         columns = np.arange(self.width_px) - (self.width_px - 1) / 2
         rows = np.arange(self.height_px) - (self.height_px - 1) / 2
         if self.mirrored:
             columns = -columns
         x, y = np.meshgrid(columns / self.focal_px, rows / self.focal_px)
         straight = self._undistorted(np.hypot(x, y))
-        rays = np.stack([x * straight, y * straight, np.ones_like(x)], axis=-1) @ self.rotation
+        return np.stack([x * straight, y * straight], axis=-1)
+
+    def to_plane(self, height_m: float) -> Floats:
+        """The homography (3, 3) from `slopes` to world x and y on the horizontal plane at `height_m`."""
+        x, y, z = self.rotation.T
         drop = height_m - self.position_m[2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            distance = np.where(drop / rays[..., 2] > 0, drop / rays[..., 2], np.nan)
-        return np.asarray(np.asarray(self.position_m)[:2] + rays[..., :2] * distance[..., None], dtype=np.float64)
+        return np.stack([self.position_m[0] * z + drop * x, self.position_m[1] * z + drop * y, z])
 
     def _undistorted(self, distorted: Floats) -> Floats:
         """Factors that turn radii in the picture, in units of the focal length, into those of the ideal pinhole."""

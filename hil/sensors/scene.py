@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -13,6 +14,7 @@ from hil.sensors.poses import Floats
 from mtm_audit.model.picture import Image
 
 SUPERSAMPLING = 3
+FLOOR_SOFTENED = 0.8  # texels
 CORNERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 Maps = NDArray[np.float32]
 
@@ -22,11 +24,14 @@ class Scene:
     """An arena of `arena_m` (length along x, width along y) centred on the origin.
 
     Every robot carries the ArUco marker of its number in the list of trajectories, or, with `colours_bgr`, a plain
-    square of its own colour.
+    square of its own colour. `floor` says what lies on it: a mat of faint grain, or a carpet; on it lie the
+    `floor_markers`, each a number with x and y of its middle in metres.
     """
 
     arena_m: tuple[float, float] = (4.5, 4.5)
     colours_bgr: tuple[tuple[int, int, int], ...] | None = None
+    floor: textures.FloorKind = "mat"
+    floor_markers: tuple[tuple[int, float, float], ...] = ()
 
     def top(self, number: int) -> Image:
         """Premultiplied BGRA picture of robot `number` from above."""
@@ -59,7 +64,20 @@ class Painter:
         self._top_xy = _finite(optics.plane_xy_m(textures.ROBOT_HEIGHT_M))
         self._floor_xy = _finite(optics.plane_xy_m(0.0))
         self._shadow = textures.shadow()
-        self._background = self._draw_background(scene)
+        self._floor = textures.floor(*scene.arena_m, kind=scene.floor, markers=scene.floor_markers)
+        self._background = self._draw_background(self._floor, samples=2)
+        self._slopes: Maps | None = None
+
+    def aim(self, optics: Optics) -> None:
+        """Look through other optics from now on, which have the same lens and size."""
+        if self._slopes is None:
+            self._slopes = optics.slopes().astype(np.float32)
+            # Softened by half a pixel or so, the floor is drawn with one sample a pixel: a new one for every picture.
+            self._floor = np.asarray(cv2.GaussianBlur(self._floor, (0, 0), FLOOR_SOFTENED), dtype=np.uint8)
+        self._optics = optics
+        self._top_xy = _plane_xy_m(self._slopes, optics, textures.ROBOT_HEIGHT_M)
+        self._floor_xy = _plane_xy_m(self._slopes, optics, 0.0)
+        self._background = self._draw_background(self._floor, samples=1)
 
     def paint(self, sightings: Sequence[Sighting]) -> Image:
         """The picture (height, width, 3), blue green red; robots nearer to the camera hide those behind them."""
@@ -74,10 +92,9 @@ class Painter:
                 picture[region] = np.clip(np.mean(layers, axis=0) + 0.5, 0, 255)
         return picture
 
-    def _draw_background(self, scene: Scene) -> Image:
-        texture = textures.floor(*scene.arena_m)
+    def _draw_background(self, texture: Image, samples: int) -> Image:
         maps = _texel_maps(self._floor_xy, np.zeros(3), texture.shape, textures.FLOOR_TEXELS_PER_M)
-        floor = _supersampled(texture, maps, 2, textures.SURROUND_BGR).astype(np.float32)
+        floor = _supersampled(texture, maps, samples, textures.SURROUND_BGR).astype(np.float32)
         floor *= _vignette(floor.shape[:2])[:, :, None]
         if self._blur_px > 0:
             floor = np.asarray(cv2.GaussianBlur(floor, (0, 0), self._blur_px), dtype=np.float32)
@@ -138,9 +155,18 @@ class Painter:
         return sides.astype(np.float32)
 
 
-def _finite(plane_xy_m: Floats) -> Maps:
+def _finite(plane_xy_m: Floats | Maps) -> Maps:
     """Pixels that look past the plane see a point far outside of everything."""
     return np.nan_to_num(plane_xy_m, nan=1e4).clip(-1e4, 1e4).astype(np.float32)
+
+
+def _plane_xy_m(slopes: Maps, optics: Optics, height_m: float) -> Maps:
+    """World x and y of what every pixel sees of a horizontal plane; far outside where it looks past it."""
+    plane = optics.to_plane(height_m)
+    xy_m = np.asarray(cv2.perspectiveTransform(slopes, plane), dtype=np.float32)
+    depth = slopes @ plane[2, :2].astype(np.float32) + np.float32(plane[2, 2])
+    xy_m[depth * np.float32(height_m - optics.position_m[2]) <= 0] = 1e4
+    return _finite(xy_m)
 
 
 def _at_height(points_xy_m: Floats, height_m: float) -> Floats:
@@ -158,11 +184,15 @@ def _texel_maps(plane_xy_m: Maps, pose: Floats, shape: tuple[int, ...], texels_p
 def _supersampled(texture: Image, maps: Maps, samples: int, beyond: tuple[int, ...] = (0, 0, 0, 0)) -> Image:
     """The texture seen through `maps`, each pixel the mean of `samples` squared; smooth maps may be enlarged."""
     rows, columns = maps.shape[:2]
+    if samples == 1:
+        plain = cv2.remap(texture, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderValue=beyond)
+        return np.asarray(plain, dtype=np.uint8)
     fine = cv2.resize(maps, (columns * samples, rows * samples), interpolation=cv2.INTER_LINEAR)
     warped = cv2.remap(texture, fine[..., 0], fine[..., 1], cv2.INTER_LINEAR, borderValue=beyond)
     return np.asarray(cv2.resize(warped, (columns, rows), interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
+@cache
 def _vignette(shape: tuple[int, int]) -> NDArray[np.float32]:
     rows, columns = (np.linspace(-1, 1, count, dtype=np.float32) for count in shape)
     return np.asarray(1.04 - 0.12 * (rows[:, None] ** 2 + columns**2) / 2 - 0.04 * columns, dtype=np.float32)

@@ -1,11 +1,15 @@
 """Textures of the floor and of robots from above, drawn once at a fixed resolution."""
 
+from collections.abc import Sequence
+from typing import Literal
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mtm_audit.model.picture import Image
 
+FloorKind = Literal["mat", "carpet"]
 TEXELS_PER_M = 600  # a multiple that gives each module of a marker a whole number of texels
 ROBOT_LENGTH_M, ROBOT_WIDTH_M, ROBOT_HEIGHT_M = 0.32, 0.24, 0.20
 MARKER_M, QUIET_ZONE_M = 0.18, 0.03
@@ -53,8 +57,13 @@ def shadow() -> NDArray[np.float32]:
     return np.asarray(cv2.GaussianBlur(mask, (0, 0), 0.03 * TEXELS_PER_M), dtype=np.float32)
 
 
-def floor(length_m: float, width_m: float) -> Image:
-    """BGR picture of the arena's mat: tiles, faint grain and a bright border."""
+def floor(
+    length_m: float, width_m: float, kind: FloorKind = "mat", markers: Sequence[tuple[int, float, float]] = ()
+) -> Image:
+    """BGR picture of the arena's floor: a mat of tiles with faint grain, or a carpet, and a bright border.
+
+    `markers` lie on it, each a number with x and y of its middle in metres.
+    """
     columns, rows = round(length_m * FLOOR_TEXELS_PER_M), round(width_m * FLOOR_TEXELS_PER_M)
     grain = np.random.default_rng(1)
     mat = np.full((rows, columns, 3), MAT_BGR, np.float32)
@@ -68,7 +77,24 @@ def floor(length_m: float, width_m: float) -> Image:
         mat[:, seam - 1 : seam + 1] = SEAM_BGR
     cv2.rectangle(mat, (0, 0), (columns - 1, rows - 1), BORDER_BGR, round(0.04 * FLOOR_TEXELS_PER_M))
     coarse = cv2.GaussianBlur(grain.normal(0, 22, mat.shape[:2]).astype(np.float32), (0, 0), 4)
-    return np.asarray(np.clip(mat + coarse[:, :, None], 0, 255), dtype=np.uint8)
+    if kind == "carpet":
+        for size, levels in ((2.0, 120), (7.0, 260)):
+            pile = cv2.GaussianBlur(grain.normal(0, levels, mat.shape[:2]).astype(np.float32), (0, 0), size)
+            mat = mat + pile[:, :, None]
+    ground = np.asarray(np.clip(mat + coarse[:, :, None], 0, 255), dtype=np.uint8)
+    for number, x_m, y_m in markers:
+        _lay_marker(ground, number, x_m, y_m)
+    return ground
+
+
+def _lay_marker(ground: Image, number: int, x_m: float, y_m: float) -> None:
+    cell = round(MARKER_M / 6 * FLOOR_TEXELS_PER_M)
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    marker = np.clip(cv2.aruco.generateImageMarker(dictionary, number, 6 * cell), 16, 245)
+    sheet = cv2.copyMakeBorder(marker, *(cell,) * 4, cv2.BORDER_CONSTANT, value=245)
+    row = round(ground.shape[0] / 2 - y_m * FLOOR_TEXELS_PER_M) - len(sheet) // 2
+    column = round(ground.shape[1] / 2 + x_m * FLOOR_TEXELS_PER_M) - len(sheet) // 2
+    ground[row : row + len(sheet), column : column + len(sheet)] = sheet[:, :, None]
 
 
 def _shape(span_m: tuple[float, float], texels_per_m: int) -> tuple[int, int, int]:

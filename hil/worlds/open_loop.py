@@ -23,10 +23,21 @@ def zigzag(count: int, step_s: float, draw: np.random.Generator) -> Floats:
 
 def wander(count: int, step_s: float, draw: np.random.Generator) -> Floats:
     """A smooth random course below the band of the noise."""
-    sections = signal.butter(2, 0.3, fs=1.0 / step_s, output="sos")
-    before = round(10.0 / step_s)
+    return _smooth(count, step_s, 0.3, draw)
+
+
+def cruise(count: int, step_s: float, draw: np.random.Generator) -> Floats:
+    """A smooth random course that a heavy vehicle can follow: its accelerations are about 0.2 m/s2."""
+    return _smooth(count, step_s, 0.1, draw)
+
+
+def _smooth(count: int, step_s: float, below_hz: float, draw: np.random.Generator) -> Floats:
+    sections = signal.butter(2, below_hz, fs=1.0 / step_s, output="sos")
+    before = round(3.0 / (below_hz * step_s))
     course = signal.sosfilt(sections, draw.standard_normal((before + count, 2)), axis=0)[before:]
-    return _level(0.35 * course / course.std())
+    # The standard deviation of such noise in the long run, whatever this piece has.
+    impulse = signal.sosfilt(sections, np.eye(1, round(20.0 / (below_hz * step_s)))[0])
+    return _level(0.35 * course / np.sqrt(np.sum(impulse**2)))
 
 
 def stop_and_go(count: int, step_s: float, draw: np.random.Generator) -> Floats:
@@ -51,6 +62,18 @@ def spinning(count: int, step_s: float, draw: np.random.Generator) -> Floats:
     ahead = cosine * course[:, 0] + sine * course[:, 1]
     left = cosine * course[:, 1] - sine * course[:, 0]
     return np.stack([ahead, left, np.ones(count)], axis=1)
+
+
+def pick_and_place(count: int, step_s: float, draw: np.random.Generator) -> Floats:
+    """A tool's smooth moves of one to two seconds (least jerk) between places of a square of 0.3 m, with rests."""
+    path: list[Floats] = [np.zeros((1, 2))]
+    while sum(map(len, path)) <= count:
+        start, goal = path[-1][-1], draw.uniform(-0.15, 0.15, 2)
+        steps = round(draw.uniform(1.0, 2.0) / step_s)
+        part = np.arange(1, steps + 1)[:, None] / steps
+        path.append(start + (goal - start) * (10.0 * part**3 - 15.0 * part**4 + 6.0 * part**5))
+        path.append(np.repeat(goal[None, :], round(draw.uniform(0.1, 0.6) / step_s), axis=0))
+    return _level(np.diff(np.concatenate(path)[: count + 1], axis=0) / step_s)
 
 
 def _held(

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from scipy import signal
 
-from hil.worlds.robomaster import Route, Task, TaskFactory, go_to_goal, heading_held
+from hil.worlds.robomaster import GoToGoal, Route, Task, TaskFactory, go_to_goal, heading_held
 from mtm_onboard.model.velocity import BodyVelocity
 
 _STREAM = 11
@@ -140,6 +140,54 @@ class Explore:
         vx_mps, vy_mps = self._noise_mps[self._tick % self._SAMPLES]
         self._tick += 1
         return BodyVelocity(mean.vx_mps + vx_mps, mean.vy_mps + vy_mps, mean.wz_radps)
+
+
+class Steer:
+    """The paper's points for a robot that cannot move sideways: it turns towards the next one while it drives."""
+
+    _SPEED_MPS = 0.5
+    _TURN_GAIN_PER_S = 2.0
+    _TURN_RADPS = 1.2
+    _ARRIVAL_M = 0.2
+
+    def __init__(self, route: Route) -> None:
+        self._points_xy_m = list(route.points_xy_m)
+
+    def command(self, position_xy_m: Point, heading_rad: float) -> BodyVelocity:
+        """Ahead as far as it faces the next point, and turning towards that; at the last point it stands."""
+        x_m, y_m = self._points_xy_m[0][0] - position_xy_m[0], self._points_xy_m[0][1] - position_xy_m[1]
+        if math.hypot(x_m, y_m) < self._ARRIVAL_M:
+            if len(self._points_xy_m) == 1:
+                return BodyVelocity(0.0, 0.0, 0.0)
+            self._points_xy_m.pop(0)
+            return self.command(position_xy_m, heading_rad)
+        off_rad = math.remainder(math.atan2(y_m, x_m) - heading_rad, math.tau)
+        turn_radps = max(-self._TURN_RADPS, min(self._TURN_RADPS, self._TURN_GAIN_PER_S * off_rad))
+        return BodyVelocity(self._SPEED_MPS * max(0.0, math.cos(off_rad)), 0.0, turn_radps)
+
+
+def steer_to_goal(route: Route, _seed: int) -> Task:
+    """The paper's points, for robots that cannot move sideways."""
+    return Steer(route)
+
+
+class Spin:
+    """The paper's task while the body turns at 1 rad/s."""
+
+    _TURN_RADPS = 1.0
+
+    def __init__(self, route: Route) -> None:
+        self._task = GoToGoal(route)
+
+    def command(self, position_xy_m: Point, heading_rad: float) -> BodyVelocity:
+        """The task's velocity, and the turn in place of a held heading."""
+        base = self._task.command(position_xy_m, heading_rad)
+        return BodyVelocity(base.vx_mps, base.vy_mps, self._TURN_RADPS)
+
+
+def spin_to_goal(route: Route, _seed: int) -> Task:
+    """The paper's task, spinning."""
+    return Spin(route)
 
 
 def _seeded(task: type[Hover] | type[Orbit] | type[StopAndGo] | type[Reciprocate] | type[Explore]) -> TaskFactory:

@@ -3,12 +3,13 @@
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import Progress
 
+from mtm_audit.commands.opened_key import KeySource, OpenedKey, opened_key
 from mtm_audit.commands.several import run_each
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.decoding import Decoding
@@ -20,32 +21,35 @@ from mtm_audit.ingest.recording import read_recording
 from mtm_audit.ingest.source import Source, sources_of
 from mtm_audit.model.recording import Recording
 from mtm_audit.model.stage import StageError, stage
+from mtm_audit.readers.logs.options import ReadOptions
 from mtm_audit.reporting.json_report import json_report
 from mtm_audit.reporting.remarks import remarks
 from mtm_audit.reporting.stages import Stage, stages_of_decoding, stages_of_recording, text_of_stages
 from mtm_audit.reporting.text import print_report
 from mtm_audit.tracking.registry import tracker
-from mtm_onboard.protocol.key import Key, load_key
+from mtm_onboard.protocol.key import Key
 
 _PIPE_COLUMNS = 140
 EXIT_CODES = {"decoded": 0, "absent": 3, "inconclusive": 4}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DecodeOptions:
-    """What the command line asked for; `plot` None draws nothing.
+    """What the command line asked for; `plot` None draws nothing, `reading` is how to read logs.
 
     `frame_rate_hz` replaces the times of films; `speed` is how many times as fast the recording is played, None to
     search for it.
     """
 
     paths: tuple[Path, ...]
-    key: Path
+    source: KeySource
     tracker: str
+    reference: tuple[str, ...]
     settings: DecodeSettings
     as_json: bool
     plot: Path | None
     explain: bool
+    reading: ReadOptions = field(default_factory=ReadOptions)
     frame_rate_hz: float | None = None
     speed: float | None = 1.0
 
@@ -59,15 +63,16 @@ def run_decode(options: DecodeOptions) -> int:
     stages: list[Stage] = []
     with _explained(options, stages):
         with stage("key"):
-            key = load_key(options.key)
+            opened = opened_key(options.source, options.settings.revoked)
+        key = opened.key
         stages.append(Stage("key", (f"{key.id}, scheme {key.scheme.name} (fingerprint {key.scheme.fingerprint})",)))
         with stage("recording"):
             sources = sources_of(options.paths)
     if len(sources) > 1:
         return run_each(
-            sources, options.plot, options.as_json, lambda source: _report(options, key, source, stages[:1])
+            sources, options.plot, options.as_json, lambda source: _report(options, opened, source, stages[:1])
         )
-    text, code = _report(options, key, sources[0], stages)
+    text, code = _report(options, opened, sources[0], stages)
     sys.stdout.write(text)
     return code
 
@@ -94,10 +99,10 @@ def _explained(options: DecodeOptions, stages: Sequence[Stage]) -> Iterator[None
         raise
 
 
-def _report(options: DecodeOptions, key: Key, source: Source, stages: list[Stage]) -> tuple[str, int]:
+def _report(options: DecodeOptions, opened: OpenedKey, source: Source, stages: list[Stage]) -> tuple[str, int]:
     """Decode one recording: what to print of it, and its exit code."""
     with _explained(options, stages):
-        recording, decoding = _decode(options, key, source, stages)
+        recording, decoding = _decode(options, opened, source, stages)
     explanation = ""
     if options.explain:
         explanation = text_of_stages([*stages, *stages_of_decoding(decoding)]) + "\n"
@@ -105,10 +110,12 @@ def _report(options: DecodeOptions, key: Key, source: Source, stages: list[Stage
         # Beside JSON the explanation must not get into what a program reads.
         sys.stderr.write(explanation)
         explanation = ""
-    return explanation + _publish(options, recording, decoding), EXIT_CODES[decoding.verdict]
+    return explanation + _publish(options, opened, recording, decoding), EXIT_CODES[decoding.verdict]
 
 
-def _decode(options: DecodeOptions, key: Key, source: Source, stages: list[Stage]) -> tuple[Recording, Decoding]:
+def _decode(
+    options: DecodeOptions, opened: OpenedKey, source: Source, stages: list[Stage]
+) -> tuple[Recording, Decoding]:
     """Run the chain and tell each stage that is done; a refusal names the stage that could not go on."""
     files, kind = source.files, source.kind
     with _progress() as progress:
@@ -123,11 +130,15 @@ def _decode(options: DecodeOptions, key: Key, source: Source, stages: list[Stage
                 kind,
                 options.tracker,
                 lambda done: progress.update(task, completed=done),
-                options.frame_rate_hz,
+                options=options.reading,
+                frame_rate_hz=options.frame_rate_hz,
+                reference=options.reference,
             )
+            recording = replace(recording, warnings=(*source.warnings, *recording.warnings))
         progress.remove_task(task)
         stages[1:] = stages_of_recording(recording)
-        return _read(recording, key, options, progress)
+        opened.check_before_public(options.settings.at or recording.at)
+        return _read(recording, opened.key, options, progress)
 
 
 def _read(recording: Recording, key: Key, options: DecodeOptions, progress: Progress) -> tuple[Recording, Decoding]:
@@ -160,19 +171,21 @@ def _read(recording: Recording, key: Key, options: DecodeOptions, progress: Prog
     return shown, decoding
 
 
-def _publish(options: DecodeOptions, recording: Recording, decoding: Decoding) -> str:
+def _publish(options: DecodeOptions, opened: OpenedKey, recording: Recording, decoding: Decoding) -> str:
     """Draw what is to be drawn; returns what is to be printed."""
-    warnings = remarks(recording, decoding)
+    key_warning = () if opened.key.warning is None else (opened.key.warning,)
+    warnings = (*remarks(recording, decoding), *key_warning)
+    basis = opened.basis(recording, decoding, stated=options.settings.at is not None)
     if options.plot is not None:
         from mtm_audit.reporting.plot import draw_plot
 
         draw_plot(recording, decoding, options.plot)
     if options.as_json:
-        return json_report(recording, decoding, warnings)
+        return json_report(recording, decoding, warnings, basis)
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
     console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS)
     with console.capture() as captured:
-        print_report(console, recording, decoding, warnings)
+        print_report(console, recording, decoding, warnings, basis)
     return captured.get()
 
 

@@ -10,17 +10,24 @@ from rich.table import Table
 
 from mtm_audit.reporting.journal_summary import AXES, JournalSummary, summary_of
 from mtm_onboard.protocol.journal_file import JournalHeader, read_journal
+from mtm_onboard.protocol.journal_noise import with_noise
+from mtm_onboard.protocol.key import load_key
 
 _PIPE_COLUMNS = 140
 
 
-def run_journal(path: Path, *, as_json: bool, plot: Path | None) -> None:
-    """Read, draw, print. Raises MtmError when there is no journal, no tick in it, or no picture can be written."""
+def run_journal(path: Path, *, as_json: bool, plot: Path | None, key: Path | None = None) -> None:
+    """Read, draw, print, with the noise that the key makes again.
+
+    Raises MtmError when there is no journal, no tick in it, another key's, or no picture can be written.
+    """
     if plot is not None:
         from mtm_audit.reporting.plot import check_plot_path
 
         check_plot_path(plot)
     record = read_journal(path)
+    if key is not None:
+        record = with_noise(record, load_key(key))
     summary = summary_of(record)
     if plot is not None:
         from mtm_audit.reporting.journal_plot import draw_journal
@@ -50,7 +57,9 @@ def _table(summary: JournalSummary) -> Table:
         "of them": ", ".join(f"{count} {name}" for name, count in summary.counts.items()),
         "lateness": f"median {late_ms[0]} ms, p99 {late_ms[1]} ms, greatest {late_ms[2]} ms",
         "saturation": f"{100.0 * summary.saturation:.2f} % of ticks cut by a limit",
-        "noise": ", ".join(
+        "noise": "left out of the journal; give --key, which makes it again"
+        if summary.rms is None or summary.energy is None
+        else ", ".join(
             f"{axis} {rms:.4f} {unit}/s rms, energy {energy:.4g} {unit}\u00b2/s"
             for axis, unit, rms, energy in zip(AXES, units, summary.rms, summary.energy, strict=True)
         ),

@@ -1,7 +1,7 @@
 """`mtm-audit profile`: learn how a type of robot follows commands from a recording that decodes."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mtm_audit.decoding.decode import decode_tracks
@@ -11,6 +11,7 @@ from mtm_audit.detectors.base import Observation
 from mtm_audit.detectors.matched.learn import learn_profile
 from mtm_audit.detectors.matched.profile import PlantProfile, save_profile
 from mtm_audit.ingest.recording import read_recording, recording_files
+from mtm_audit.readers.logs.options import ReadOptions
 from mtm_audit.tracking.registry import tracker
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key, load_key
@@ -24,7 +25,9 @@ class ProfileOptions:
     key: Path
     out: Path
     tracker: str
+    reference: tuple[str, ...]
     settings: DecodeSettings
+    reading: ReadOptions = field(default_factory=ReadOptions)
 
 
 def run_profile(options: ProfileOptions) -> None:
@@ -34,7 +37,7 @@ def run_profile(options: ProfileOptions) -> None:
     tracker(options.tracker)
     key = load_key(options.key)
     files, kind = recording_files(options.paths)
-    recording = read_recording(files, kind, options.tracker, lambda _: None)
+    recording = read_recording(files, kind, options.tracker, options=options.reading, reference=options.reference)
     decoding = decode_tracks(recording.tracks, key, options.settings)
     if decoding.verdict != "decoded":
         raise MtmError(

@@ -8,6 +8,7 @@ import numpy as np
 
 from mtm_audit.decoding.assignment import Assignment
 from mtm_audit.decoding.pairing import best_pairs
+from mtm_audit.decoding.views import view_strengths
 from mtm_audit.detectors.base import Detector
 from mtm_audit.model.glimpse import Glimpse
 from mtm_audit.model.timing import Onset
@@ -52,7 +53,7 @@ def associate(
     open_channels = [channel for channel in channels if channel.body in assignment.unsettled]
     if not (open_channels and free):
         return association
-    strengths = detector.strengths(codebooks, open_channels, free, onset)
+    strengths = view_strengths(detector, codebooks, open_channels, free, onset)
     found, sums = best_pairs(open_channels, strengths)
     return replace(
         association,

@@ -17,6 +17,8 @@ from mtm_audit.detectors.base import ChannelReading
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol import Channel, Scheme
 from mtm_onboard.protocol.framing import frame_order
+from mtm_onboard.protocol.framing.slot_mask import slot_mask
+from mtm_onboard.protocol.holding import Holding, Secret, holding_of
 from mtm_onboard.protocol.slots import epoch_of_slot
 
 Integers = NDArray[np.int64]
@@ -48,7 +50,7 @@ class Heard:
 
 
 def decode_frames(
-    heard: Sequence[Heard], scheme: Scheme, secret: bytes, first_slot: int, *, order_known: bool
+    heard: Sequence[Heard], scheme: Scheme, secret: Secret, first_slot: int, *, order_known: bool
 ) -> tuple[Delivered, ...]:
     """The messages in the order in which they were sent; without any that holds, the best guess alone.
 
@@ -57,27 +59,30 @@ def decode_frames(
     """
     checked = scheme.framing is not None and scheme.framing.check != "none"
     turns = range(_turns(scheme) if checked and not order_known else 1)
-    sights = [_Sight(heard, scheme, first_slot, turn) for turn in turns]
-    wholes = [[sight.decoded(part, secret) for part in sight.parts(sight.seen)] for sight in sights]
+    holding = holding_of(secret)
+    sights = [_Sight(heard, scheme, holding, first_slot, turn) for turn in turns]
+    wholes = [[sight.decoded(part) for part in sight.parts(sight.seen)] for sight in sights]
     tried = sum(item.message.tried for found in wholes for item in found)
     best = max(wholes, key=_worth)
     if checked and not _whole(best):
         for sight, place in islice(_cuts(sights), _MOST_CUTS):
             parts = [*sight.parts(sight.seen[:place]), *sight.parts(sight.seen[place:])]
-            found = [sight.decoded(part, secret) for part in parts]
+            found = [sight.decoded(part) for part in parts]
             tried += sum(item.message.tried for item in found)
             best = max(best, found, key=_worth)
-    holding = _holding(best) or best[:1]
-    return tuple(replace(item, message=replace(item.message, tried=tried)) for item in holding)
+    delivered = _holding(best) or best[:1]
+    return tuple(replace(item, message=replace(item.message, tried=tried)) for item in delivered)
 
 
 class _Sight:
     """All windows seen, put into slots and frame order, the message turned by `turn` windows."""
 
-    def __init__(self, heard: Sequence[Heard], scheme: Scheme, first_slot: int, turn: int) -> None:
+    def __init__(self, heard: Sequence[Heard], scheme: Scheme, holding: Holding, first_slot: int, turn: int) -> None:
         self._scheme = scheme
+        self._holding = holding
         self._ratios: dict[int, Floats] = {}
         self._spans_s: dict[int, tuple[float, float]] = {}
+        self._masks: dict[int, Integers | None] = {}
         for item in heard:
             first = scheme.first_position(item.channel)
             window_s = scheme.window_ticks(item.channel) / item.result.reading.timing.rate_hz
@@ -94,10 +99,11 @@ class _Sight:
         """The slots by epoch, since a check holds in one alone."""
         return [list(group) for _, group in groupby(slots, key=self._epoch)]
 
-    def decoded(self, part: Sequence[int], secret: bytes) -> Delivered:
+    def decoded(self, part: Sequence[int]) -> Delivered:
         """What slots of one epoch say together."""
         ratios: Floats = np.sum([self._ratios[slot] for slot in part], axis=0)
-        message = decode_message(ratios, self._scheme, secret, [self._epoch(part[0])])
+        epoch = self._epoch(part[0])
+        message = decode_message(ratios, self._scheme, self._holding.tag_key(epoch), [epoch])
         saying = [slot for slot in part if _says(self._ratios[slot], np.argmax(ratios, axis=1))] or list(part)
         start_s = min(self._spans_s[slot][0] for slot in saying)
         end_s = max(self._spans_s[slot][1] for slot in saying)
@@ -109,7 +115,17 @@ class _Sight:
     def _add(self, slot: int, positions: Integers, ratios: Floats) -> None:
         shape = (self._scheme.message_symbols, self._scheme.alphabet_size)
         table = self._ratios.setdefault(slot, np.zeros(shape))
-        table[frame_order(self._scheme, slot)[positions]] += ratios
+        places, mask = frame_order(self._scheme, slot)[positions], self._mask(slot)
+        if mask is not None:
+            # Symbol j without the mask was sent as j ^ mask.
+            sent = np.arange(shape[1]) ^ mask[places][:, None]
+            ratios = np.take_along_axis(ratios, sent, axis=1)
+        table[places] += ratios
+
+    def _mask(self, slot: int) -> Integers | None:
+        if slot not in self._masks:
+            self._masks[slot] = slot_mask(self._scheme, self._holding, slot)
+        return self._masks[slot]
 
     def _span(self, slot: int, start_s: float, end_s: float) -> None:
         known = self._spans_s.get(slot, (start_s, end_s))

@@ -10,18 +10,20 @@ import numpy as np
 from mtm_audit.decoding.assignment import Assignment
 from mtm_audit.decoding.association import Association, associate, exchanged, shown_elsewhere
 from mtm_audit.decoding.start import Start
-from mtm_audit.detectors.base import ChannelReading, Detector, Observation
+from mtm_audit.decoding.views import Part, frames_of, parts_of, together, view_strengths
+from mtm_audit.detectors.base import ChannelReading, Detector
 from mtm_audit.model.glimpse import Glimpse, glimpse_of_track
+from mtm_audit.model.reference_frame import ReferenceFrame
 from mtm_audit.model.stage import stage
-from mtm_audit.model.track import Track
+from mtm_audit.model.track import Floats, Track
 from mtm_audit.significance.channel_terms import channel_terms
-from mtm_audit.significance.decoys import DecoyComparison, compare, decoy_codebooks
+from mtm_audit.significance.decoys import compare, decoy_codebooks
 from mtm_audit.significance.evidence import Evidence, needed_nats
 from mtm_audit.significance.message_evidence import MessageEvidence, weigh_message
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key
-from mtm_onboard.protocol.scheme import Scheme
+from mtm_onboard.protocol.scheme import Channel, Scheme
 
 # The onset search takes about a kilobyte a tick; at 50 Hz this is 2.8 h.
 _MOST_TICKS = 500_000
@@ -34,10 +36,11 @@ Progress = Callable[[str, float], None]
 class Readings:
     """`channels` by name, those that could be read, and `refusals` why others could not; `message` the exact evidence,
     None from a detector that gives none, and `channel_nats` by channel name; `also_shows` by track name which channel
-    its motion plays, where tracks were compared.
+    its motion plays, where tracks were compared. `frame` is the one whose axes the motion was read along.
     """
 
     association: Association
+    frame: ReferenceFrame
     channels: Mapping[str, ChannelReading]
     refusals: Mapping[str, MtmError]
     evidence: Evidence
@@ -80,6 +83,28 @@ def read_tracks(
     return _with_better_tracks(first, free, read) or first
 
 
+@dataclass(frozen=True, kw_only=True)
+class _View:
+    """What all channels say in one frame; `parts` by channel name, `strengths` (1 + decoys,) mean strengths."""
+
+    frame: ReferenceFrame
+    parts: Mapping[str, Sequence[Part]]
+    refusals: Mapping[str, MtmError]
+    message: MessageEvidence | None
+    strengths: Floats
+
+    @property
+    def rank(self) -> tuple[int, float]:
+        """The more channels, and then the more evidence, the better."""
+        return len(self.parts), float(self.strengths[0]) if self.message is None else self.message.presence_nats
+
+    @property
+    def maxima(self) -> int:
+        """Over how many maxima over candidates the strength is a mean."""
+        results = [part.result for each in self.parts.values() for part in each]
+        return sum(len(np.unique(result.reading.window_positions)) for result in results)
+
+
 @dataclass(frozen=True)
 class _Reader:
     """Reads all channels under one association after the other."""
@@ -96,45 +121,63 @@ class _Reader:
         return self.codebooks[0].scheme
 
     def under(self, association: Association, also_shows: Mapping[str, str] | None = None) -> Readings:
-        """What all channels say with these tracks."""
+        """What all channels say with these tracks, in the frame in which they say most."""
+        channels = [channel for channel in self.scheme.channels if channel.body in association.glimpses]
+        frames = frames_of(channels, association.glimpses.values())
+        views = [self._view(channels, association, frame) for frame in frames]
+        best = max(views, key=lambda view: view.rank)
+        sums = np.max([view.strengths for view in views], axis=0)
+        message = None if best.message is None else best.message.discounted(math.log(len(frames)))
+        decoys = None
+        if len(self.codebooks) > 1 and best.parts:
+            decoys = compare(sums, self.detector.strength_law, best.maxima)
+        return Readings(
+            association=association,
+            frame=best.frame,
+            channels={name: parts[0].result for name, parts in best.parts.items()},
+            refusals=best.refusals,
+            evidence=Evidence(None if message is None else message.presence_nats, decoys),
+            message=message,
+            channel_nats={} if message is None else message.channels_nats,
+            also_shows=also_shows or {},
+        )
+
+    def _view(self, channels: Sequence[Channel], association: Association, frame: ReferenceFrame) -> _View:
         observations = [
-            Observation(channel, association.glimpses[channel.body])
-            for channel in self.scheme.channels
-            if channel.body in association.glimpses
+            observation
+            for channel in channels
+            for observation in parts_of(channel, association.glimpses[channel.body], frame)
         ]
         report = None if self.progress is None else partial(self.progress, "reading")
         results = self.detector.read(self.codebooks[0], self.codebooks[1:], observations, self.start.onset, report)
-        found = {
-            observation.channel.name: result
-            for observation, result in zip(observations, results, strict=True)
-            if not isinstance(result, MtmError)
-        }
-        refusals = {
-            observation.channel.name: result
-            for observation, result in zip(observations, results, strict=True)
-            if isinstance(result, MtmError)
-        }
-        message = self._message(found, association) if found else None
-        nats = {} if message is None else dict(zip(found, message.channels_nats, strict=True))
-        decoys = _compare(self.detector, self.scheme, found, association) if len(self.codebooks) > 1 and found else None
-        evidence = Evidence(None if message is None else message.presence_nats, decoys)
-        return Readings(
-            association=association, channels=found, refusals=refusals, evidence=evidence, message=message,
-            channel_nats=nats, also_shows=also_shows or {},
-        )  # fmt: skip
+        read: dict[str, list[Part]] = {}
+        refusals: dict[str, MtmError] = {}
+        for observation, result in zip(observations, results, strict=True):
+            if isinstance(result, MtmError):
+                refusals[observation.channel.name] = result
+            else:
+                read.setdefault(observation.channel.name, []).append(Part(observation.channel, result))
+        log_evidence = self.detector.strength_law == "log evidence"
+        parts = {name: together(each, log_evidence=log_evidence) for name, each in read.items()}
+        return _View(
+            frame=frame,
+            parts=parts,
+            refusals={name: refusal for name, refusal in refusals.items() if name not in parts},
+            message=self._message(parts, association) if parts else None,
+            strengths=_strengths(self.scheme, parts, association) if parts else np.zeros(len(self.codebooks)),
+        )
 
-    def _message(self, found: Mapping[str, ChannelReading], association: Association) -> MessageEvidence | None:
+    def _message(self, parts: Mapping[str, Sequence[Part]], association: Association) -> MessageEvidence | None:
         """The exact evidence, with the choice of tracks paid for; None without prepared motions."""
-        if any(result.prepared is None for result in found.values()):
+        flat = [part for each in parts.values() for part in each]
+        if any(part.result.prepared is None for part in flat):
             return None
         scheme = self.scheme
-        channels = [channel for channel in scheme.channels if channel.name in found]
         apart = scheme.framing is not None and scheme.schedule == "rolling"
         terms = [
-            channel_terms(self.codebooks[0], channel, found[channel.name], self.start.onset, apart=apart)
-            for channel in channels
+            channel_terms(self.codebooks[0], part.channel, part.result, self.start.onset, apart=apart) for part in flat
         ]
-        costs = [association.log_priors[channel.body] for channel in channels]
+        costs = [association.log_priors[part.channel.body] for part in flat]
         return weigh_message(terms, costs, scheme.message_symbols, symbols=scheme.framing is None)
 
     def in_doubt(self, readings: Readings) -> list[str]:
@@ -169,7 +212,9 @@ def _with_better_tracks(first: Readings, free: Sequence[Glimpse], reader: _Reade
     if not doubtful or not tracks or alone:
         return None
     # A second guess at names is worth no search of clocks that are far off as well.
-    strengths = reader.detector.strengths(reader.codebooks[:1], channels, tracks, start.onset, usual_rates=True)[0]
+    strengths = view_strengths(reader.detector, reader.codebooks[:1], channels, tracks, start.onset, usual_rates=True)[
+        0
+    ]
     also = shown_elsewhere(strengths, channels, tracks, math.log(1.0 / reader.threshold))
     better = exchanged(first.association, doubtful, tracks, channels, strengths)
     if better is not None:
@@ -206,17 +251,14 @@ def _nothing_to_read() -> MtmError:
     return MtmError("no track can be read as any channel; record longer, with the robots in sight")
 
 
-def _compare(
-    detector: Detector, scheme: Scheme, found: Mapping[str, ChannelReading], association: Association
-) -> DecoyComparison:
-    """The mean strength over all channels beside the decoys', each codebook under its own choice of tracks."""
-    results = list(found.values())
+def _strengths(scheme: Scheme, parts: Mapping[str, Sequence[Part]], association: Association) -> Floats:
+    """The mean strength over all channels, (1 + decoys,), each codebook under its own choice of tracks."""
+    results = {name: each[0].result for name, each in parts.items()}
     searched = {channel.name for channel in scheme.channels if channel.body in association.searched}
-    sums = np.zeros(1 + len(results[0].decoy_strengths))
+    sums: Floats = np.zeros(1 + len(next(iter(results.values())).decoy_strengths))
     if association.strengths is not None:
         sums = sums + association.strengths
-    for name, result in found.items():
+    for name, result in results.items():
         if association.strengths is None or name not in searched:
             sums = sums + np.concatenate([[result.reading.strength], result.decoy_strengths])
-    maxima = sum(len(np.unique(result.reading.window_positions)) for result in results)
-    return compare(sums / len(results), detector.strength_law, maxima)
+    return sums / len(results)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_audit.model.recorded_at import RecordedAt
+from mtm_onboard.protocol.revocation import RevocationList
 
 # Decoys are all that the paper's detector has to compare with; matched needs none.
 _USUAL_DECOYS = {"coherency": 40}
@@ -17,6 +18,7 @@ class DecodeSettings:
     `threshold` is how often the answer "decoded" may be wrong. `decoys` None takes as many as the detector needs.
     `profile` is what is known of the robots' plant beforehand; the detector must take one. `at` is when the recording
     was made, which a rolling schedule needs.
+    `revoked` lists key files that are no longer trusted.
     """
 
     detector: str = "matched"
@@ -26,6 +28,7 @@ class DecodeSettings:
     assignment: Mapping[str, str] = field(default_factory=dict)
     profile: PlantProfile | None = None
     at: RecordedAt | None = None
+    revoked: RevocationList = field(default_factory=RevocationList)
 
     @property
     def decoy_count(self) -> int:

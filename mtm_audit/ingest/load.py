@@ -1,31 +1,38 @@
 """Any recording into tracks."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from mtm_audit.ingest.films import film_frames
+from mtm_audit.model.picture import Frame
 from mtm_audit.model.track import Track
-from mtm_audit.readers.motion_capture import read_motion_capture
+from mtm_audit.readers.logs.opening import opening_of
+from mtm_audit.readers.logs.registry import check_foreign, format_of, read_log
 from mtm_audit.readers.text import check_readable
+from mtm_audit.readers.video import read_frames
 from mtm_audit.tracking.registry import tracker
+from mtm_onboard.protocol.errors import MtmError
 
 VIDEO_SUFFIXES = frozenset(
     {".264", ".265", ".3gp", ".avi", ".h264", ".h265", ".hevc", ".ivf", ".m2ts", ".m4v", ".mjpeg", ".mjpg", ".mkv"}
     | {".mov", ".mp4", ".mpeg", ".mpg", ".mts", ".mxf", ".obu", ".ogv", ".ts", ".vob", ".webm", ".wmv", ".y4m"}
 )
+# What these follow is no place in a picture, or is in a picture that a simulator drew.
+_NO_CAMERA = frozenset({"arms", "football", "brightness"})
 
 
 def is_video(path: Path) -> bool:
-    """By its suffix, or else by its content: text is motion capture, anything else is video.
+    """By its suffix, or else by its content: what is neither text nor a known log is video.
 
-    Raises MtmError when the file is missing, empty or a folder.
+    Raises MtmError when the file is missing, empty or a folder, or of a format that is known not to be read.
     """
     check_readable(path)
     if path.suffix.lower() in VIDEO_SUFFIXES:
         return True
-    with path.open("rb") as file:
-        start = file.read(4096)
-    return b"\0" in start
+    opening = opening_of(path)
+    if opening.is_text or format_of(opening) is not None:
+        return False
+    check_foreign(opening)
+    return True
 
 
 def load_tracks(
@@ -33,28 +40,33 @@ def load_tracks(
     tracker_name: str = "aruco",
     warn: Callable[[str], None] | None = None,
     progress: Callable[[int], None] | None = None,
+    reference: Sequence[str] = (),
 ) -> list[Track]:
-    """Read one recording: a video through the named tracker, or a motion-capture file as it is.
+    """Read one recording: a video through the named tracker, or a log or motion-capture file as it is.
 
+    The camera's own motion is taken out, by the tracks that `reference` names or by what is found to stand still.
     `warn` receives one sentence for each thing that is wrong but leaves something to use; `progress` the number of
     frames tracked so far. Raises MtmError when the recording cannot be used.
     """
     if not is_video(path):
-        return [read_motion_capture(path)]
-    return film_tracks([path], tracker_name, warn, progress)
+        return list(read_log(path, warn=warn).tracks)
+    pixels = tracker(tracker_name).pixels
+    return tracked(read_frames(path, pixels, warn), tracker_name, reference, warn, progress)
 
 
-def film_tracks(
-    files: Sequence[Path],
-    tracker_name: str = "aruco",
+def tracked(
+    frames: Iterable[Frame],
+    tracker_name: str,
+    reference: Sequence[str] = (),
     warn: Callable[[str], None] | None = None,
     progress: Callable[[int], None] | None = None,
-    frame_rate_hz: float | None = None,
 ) -> list[Track]:
-    """Follow what moves in one film, in however many files it came; `frame_rate_hz` replaces their times.
+    """The tracks in frames, the camera's own motion taken out; see `load_tracks`."""
+    chosen = tracker(tracker_name, warn)
+    if tracker_name.partition(":")[0] in _NO_CAMERA:
+        if reference:
+            raise MtmError(f"the tracker {tracker_name} measures nothing against a reference; leave out --reference")
+        return chosen.track(frames, progress)
+    from mtm_audit.tracking.stabilise import stabilised_tracks
 
-    Otherwise as `load_tracks`.
-    """
-    chosen = tracker(tracker_name)
-    frames = film_frames(files, chosen.pixels, warn or (lambda sentence: None), frame_rate_hz)
-    return chosen.track(frames, progress)
+    return stabilised_tracks(chosen, frames, reference, warn, progress)

@@ -7,21 +7,25 @@ from pathlib import Path
 from mtm_audit.ingest.chapters import films_of
 from mtm_audit.ingest.films import is_picture
 from mtm_audit.ingest.load import VIDEO_SUFFIXES, is_video
+from mtm_audit.ingest.logs import log_files
 from mtm_audit.model.recording import Kind
 from mtm_audit.readers.picture_folder import pictures_in
 from mtm_onboard.protocol.errors import MtmError
 
-_MOTION_CAPTURE_SUFFIXES = frozenset({".csv", ".tum", ".txt"})
 # Where `mtm-hil record` puts the motion capture.
 _MOTION_CAPTURE_FOLDER = "mocap"
 
 
 @dataclass(frozen=True)
 class Source:
-    """One recording: a video, the chapters of one, a folder of pictures, or motion-capture files of several bodies."""
+    """One recording: a video, the chapters of one, a folder of pictures, or logs and motion capture of several bodies.
+
+    `warnings` say what a folder holds that cannot be read.
+    """
 
     files: tuple[Path, ...]
     kind: Kind
+    warnings: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -30,10 +34,10 @@ class Source:
 
 
 def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
-    """The recordings behind `paths`: each film is one, all motion-capture files together are one.
+    """The recordings behind `paths`: each film is one, all logs and motion-capture files together are one.
 
-    A folder stands for the films in it, or else for its pictures as one film, or else for its motion capture. Raises
-    MtmError when a file is missing or empty, a folder holds nothing of these, or films come with motion capture.
+    A folder stands for the films in it, or else for its pictures as one film, or else for its logs. Raises
+    MtmError when a file is missing or empty, a folder holds nothing of these, or films come with logs.
     """
     folders = [path for path in paths if path.is_dir()]
     found = [source for folder in folders for source in _in_folder(folder)]
@@ -54,8 +58,9 @@ def _joined(found: Sequence[Source]) -> tuple[Source, ...]:
     films = tuple(source for source in found if source.kind == "video")
     bodies = tuple(file for source in found if source.kind != "video" for file in source.files)
     if films and bodies:
-        raise MtmError(f"{films[0].name} is a film and {bodies[0]} is motion capture; decode them one by one")
-    return films or (Source(bodies, "motion capture"),)
+        raise MtmError(f"{films[0].name} is a film and {bodies[0]} is a log; decode them one by one")
+    warnings = tuple(warning for source in found for warning in source.warnings)
+    return films or (Source(bodies, "motion capture", warnings),)
 
 
 def _in_folder(folder: Path) -> list[Source]:
@@ -68,12 +73,13 @@ def _in_folder(folder: Path) -> list[Source]:
         return [Source(film, "video") for film in films_of(videos)]
     if pictures_in(folder):
         return [Source((folder,), "video")]
-    bodies = tuple(path for path in files if path.suffix.lower() in _MOTION_CAPTURE_SUFFIXES)
-    if bodies:
-        return [Source(bodies, "motion capture")]
+    left_out: list[str] = []
+    logs = log_files(folder, left_out.append)
+    if logs:
+        return [Source(tuple(logs), "motion capture", tuple(left_out))]
     if (folder / _MOTION_CAPTURE_FOLDER).is_dir():
         return _in_folder(folder / _MOTION_CAPTURE_FOLDER)
     raise MtmError(
-        f"the folder {folder} holds no video, no pictures and no motion-capture file (.tum, .csv or .txt); name such a "
-        "folder or file"
+        f"the folder {folder} holds no video, no pictures and no log or motion capture of a format that is read "
+        "(docs/formats.md); name such a folder or file"
     )

@@ -15,6 +15,7 @@ class Glimpse:
 
     `edges_s` (n + 1,) times of the observations; `velocities` (n, axes), the mean over each interval in `unit` per
     second; `valid` (n,) False where an interval bridges a gap (its mean is the displacement over the whole gap).
+    `headings_rad` (n + 1,) at the edges, unwrapped, None where they are not known.
     """
 
     name: str
@@ -22,6 +23,7 @@ class Glimpse:
     velocities: Floats
     valid: Bools
     axes: tuple[str, ...]
+    headings_rad: Floats | None = None
 
     @property
     def starts_s(self) -> Floats:
@@ -52,7 +54,19 @@ def glimpse_of_track(track: Track) -> Glimpse:
     durations_s = np.diff(times_s)
     velocities = np.diff(positions, axis=0) / durations_s[:, None]
     valid = durations_s <= 2.5 * np.median(durations_s)
-    return Glimpse(track.name, times_s, velocities, valid, track.axes)
+    return Glimpse(track.name, times_s, velocities, valid, track.axes, _headings_at(track))
+
+
+def _headings_at(track: Track) -> Floats | None:
+    """Headings where the track is valid, unwrapped, straight through missing ones; None when half of them are."""
+    if track.headings_rad is None:
+        return None
+    headings_rad = track.headings_rad[track.valid]
+    known = np.isfinite(headings_rad)
+    if known.sum() <= 0.5 * len(known):
+        return None
+    times_s = track.times_s[track.valid]
+    return np.interp(times_s, times_s[known], np.unwrap(headings_rad[known]))
 
 
 def tick_velocities(glimpse: Glimpse, first_tick_s: float, rate_hz: float, ticks: int) -> Floats:

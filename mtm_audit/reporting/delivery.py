@@ -7,6 +7,10 @@ from mtm_audit.decoding.frames import Delivered
 from mtm_onboard.protocol.framing import Payload
 from mtm_onboard.protocol.slots import slot_start_unix_s
 
+# A motion seen later than this after its slot is told as a possible relay; cameras, plants and clocks that are kept by
+# the network are together less late.
+RELAY_S = 1.0
+
 
 def payload_text(payload: Payload) -> str:
     """The payload as a reader sees it: a number, hexadecimal bytes, or text in quotes."""
@@ -15,8 +19,11 @@ def payload_text(payload: Payload) -> str:
     return f'text "{payload}"' if isinstance(payload, str) else f"message {payload}"
 
 
-def frame_sentences(decoding: Decoding) -> tuple[str, ...]:
-    """What was delivered when, and what follows from its check; nothing for plain messages or without a message."""
+def frame_sentences(decoding: Decoding, *, authenticates: bool = True) -> tuple[str, ...]:
+    """What was delivered when, and what follows from its check; nothing for plain messages or without a message.
+
+    `authenticates` False leaves out what a tag would prove: what the verdict rests on is not enough for that.
+    """
     if decoding.verdict != "decoded" or not decoding.frames:
         return ()
     earlier = [
@@ -24,7 +31,8 @@ def frame_sentences(decoding: Decoding) -> tuple[str, ...]:
         for frame in decoding.frames[:-1]
         if frame.message.payload is not None
     ]
-    return (*earlier, proof_sentence(decoding))
+    proof = (proof_sentence(decoding),) if authenticates or decoding.frames[-1].message.check != "tag" else ()
+    return (*earlier, *proof)
 
 
 def proof_sentence(decoding: Decoding) -> str:
@@ -42,8 +50,8 @@ def proof_sentence(decoding: Decoding) -> str:
             "the key, nor that the recording's time is right."
         )
     return (
-        f"{proof}. It does not prove who held the key, nor when: under a fixed schedule an old motion played again "
-        "looks the same."
+        f"Its {message.check_bits}-bit tag holds ({chance}), so whoever wrote this message had the key. It does not "
+        "prove who held the key, nor when it was sent, nor by which robot."
     )
 
 
@@ -53,16 +61,32 @@ def slot_time(decoding: Decoding) -> str:
     return datetime.fromtimestamp(unix_s, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
-def clock_sentence(decoding: Decoding) -> str | None:
-    """How far the recording's clock was from the robot's; None under the fixed schedule or without a message."""
+def late_s(decoding: Decoding) -> float | None:
+    """How long after its slot the motion was seen, by the recording's time as given; below zero before it.
+
+    None under the fixed schedule, without a message and without a time.
+    """
     at, scheme = decoding.settings.at, decoding.scheme
     onsets_s = [item.reading.timing.onset_s for item in decoding.channels if item.reading is not None]
     if scheme.schedule == "fixed" or at is None or decoding.verdict == "absent":
         return None
     nominal_s = slot_start_unix_s(decoding.start.first_slot, scheme) - at.unix_s
-    off_s = sorted(onset_s - nominal_s for onset_s in onsets_s)[len(onsets_s) // 2]
+    return sorted(onset_s - nominal_s for onset_s in onsets_s)[len(onsets_s) // 2]
+
+
+def clock_sentence(decoding: Decoding) -> str | None:
+    """How far the recording's clock was from the robot's, and what else that may be; None where `late_s` is."""
+    off_s = late_s(decoding)
+    if off_s is None:
+        return None
     way = "behind" if off_s < 0.0 else "ahead of"
-    return f"By the robot's clock the recording's time, as given, is {abs(off_s):.2f} s {way} UTC."
+    apart = f"By the robot's clock the recording's time, as given, is {abs(off_s):.2f} s {way} UTC."
+    if off_s < RELAY_S:
+        return apart
+    return (
+        f"{apart} Or it could be a relay of {off_s:.0f} s: a motion that was seen in its time and played again so much "
+        f"later reads the same. Where both clocks are known to be synchronised, --at-error 2 rules out longer ones."
+    )
 
 
 def _said(frame: Delivered) -> str:

@@ -34,8 +34,9 @@ class JournalSummary:
     `ticks` counts rows, those whose command never left included; `missed` counts ticks between the first and the last
     that have no row, since the loop came too late; `counts` the rows of each kind; `lateness_s` are the median, the
     99th percentile and the greatest. `energy` is the sum of the noise's square times the tick's length on each axis, in
-    m^2/s and rad^2/s; `rms` its root mean square over the ticks with noise, in m/s and rad/s. `saturation` is the share
-    of ticks in which a limit cut something.
+    m^2/s and rad^2/s; `rms` its root mean square over the ticks with noise, in m/s and rad/s. Both are None where the
+    journal leaves the noise out and no key has made it again, and do not count ticks in which a limit cut that.
+    `saturation` is the share of ticks in which a limit cut something.
     """
 
     header: JournalHeader
@@ -45,8 +46,8 @@ class JournalSummary:
     missed: int
     lateness_s: tuple[float, float, float]
     counts: dict[str, int]
-    energy: tuple[float, ...]
-    rms: tuple[float, ...]
+    energy: tuple[float, ...] | None
+    rms: tuple[float, ...] | None
     saturation: float
     events: tuple[Event, ...]
     damaged: int
@@ -72,14 +73,18 @@ class JournalSummary:
                 **{name.replace(" ", "_"): count for name, count in self.counts.items()},
             },
             "lateness_s": dict(zip(("p50", "p99", "max"), self.lateness_s, strict=True)),
-            "noise": {
-                axis: {"energy": energy, "rms": rms}
-                for axis, energy, rms in zip(AXES, self.energy, self.rms, strict=True)
-            },
+            "noise": self._noise(),
             "saturation": self.saturation,
             "events": [{"tick": event.tick, "text": event.text} for event in self.events],
             "damaged_lines": self.damaged,
         }  # fmt: skip
+
+    def _noise(self) -> dict[str, dict[str, float]] | None:
+        if self.energy is None or self.rms is None:
+            return None
+        return {
+            axis: {"energy": energy, "rms": rms} for axis, energy, rms in zip(AXES, self.energy, self.rms, strict=True)
+        }
 
 
 def summary_of(record: JournalRecord) -> JournalSummary:
@@ -87,14 +92,16 @@ def summary_of(record: JournalRecord) -> JournalSummary:
     _check(record)
     ticks, noise = record.ticks, record.noise
     counts = {name: int(np.count_nonzero(record.flags & bit)) for name, bit in _FLAGS.items()}
-    squares = np.sum(noise**2, axis=0)
-    noisy = max(1, int(np.count_nonzero((record.flags & NOISE) & ~(record.flags & UNSENT))))
+    with_noise = ((record.flags & NOISE) != 0) & ((record.flags & UNSENT) == 0)
+    known = ~np.isnan(noise).any(axis=1)
+    squares, noisy = np.sum(noise[known] ** 2, axis=0), max(1, int(np.count_nonzero(with_noise & known)))
+    said = bool((with_noise & known).any()) or not with_noise.any()
     median_s, late_s, worst_s = np.quantile(record.lateness_s, (0.5, 0.99, 1.0))
     return JournalSummary(
         record.header, len(ticks), int(ticks[0]), int(ticks[-1]), int(ticks[-1] - ticks[0] + 1) - len(np.unique(ticks)),
         (float(median_s), float(late_s), float(worst_s)), counts,
-        tuple(float(value) for value in squares / record.header.rate_hz),
-        tuple(float(value) for value in np.sqrt(squares / noisy)),
+        tuple(float(value) for value in squares / record.header.rate_hz) if said else None,
+        tuple(float(value) for value in np.sqrt(squares / noisy)) if said else None,
         counts["clamped"] / len(ticks), record.events, record.damaged,
     )  # fmt: skip
 
@@ -104,8 +111,9 @@ def injected_noise(record: JournalRecord, start_s: float | None = None) -> Glimp
 
     One interval a tick, axes vx, vy and wz. `start_s` is when the message begins on the clock that the times should be
     in, such as a recording's; without it they are seconds since the Unix epoch, or since the start in simulated time.
-    In a tick that is missing the robot kept its last command: the noise is held and the interval not valid. Raises
-    MtmError when the journal has no rows.
+    In a tick that is missing the robot kept its last command: the noise is held and the interval not valid. Nor is it
+    valid in ticks whose noise the journal leaves out, see `journal_noise.with_noise`. Raises MtmError when the journal
+    has no rows.
     """
     _check(record)
     if start_s is None:
@@ -114,9 +122,11 @@ def injected_noise(record: JournalRecord, start_s: float | None = None) -> Glimp
     rows = np.zeros(int(places[-1]) + 1, dtype=np.int64)
     rows[places] = np.arange(len(places))
     valid = np.zeros(len(rows), dtype=np.bool_)
-    valid[places] = True
+    noise = record.noise
+    valid[places] = ~np.isnan(noise).any(axis=1)
+    noise = np.nan_to_num(noise)
     edges_s = start_s + (record.ticks[0] + np.arange(len(rows) + 1)) / record.header.rate_hz
-    return Glimpse(record.header.robot, edges_s, record.noise[np.maximum.accumulate(rows)], valid, AXES)
+    return Glimpse(record.header.robot, edges_s, noise[np.maximum.accumulate(rows)], valid, AXES)
 
 
 def _check(record: JournalRecord) -> None:

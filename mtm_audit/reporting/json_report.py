@@ -10,15 +10,18 @@ import numpy as np
 from mtm_audit.decoding.decoding import ChannelDecoding, Decoding
 from mtm_audit.decoding.frames import Delivered
 from mtm_audit.model.recording import Recording
+from mtm_audit.reporting.basis import Basis
+from mtm_audit.reporting.delivery import late_s
 from mtm_audit.reporting.text import message_bits
 from mtm_audit.significance.decoys import DecoyComparison
 from mtm_onboard.protocol.installing import DISTRIBUTION
 from mtm_onboard.protocol.slots import slot_start_unix_s
 
 SCHEMA_VERSION = 2
+_NO_BASIS = Basis()
 
 
-def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, ...]) -> str:
+def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, ...], basis: Basis = _NO_BASIS) -> str:
     """The whole answer as one JSON object with a newline at its end; numbers are finite, nothing in it is secret."""
     evidence, scheme = decoding.evidence, decoding.scheme
     report = {
@@ -27,7 +30,7 @@ def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, .
         "verdict": decoding.verdict,
         "message": decoding.message.hex() if isinstance(decoding.message, bytes) else decoding.message,
         "message_bits": message_bits(decoding),
-        "frames": [_frame(frame, decoding) for frame in decoding.frames if frame.message.payload is not None],
+        "frames": [_frame(frame, decoding, basis) for frame in decoding.frames if frame.message.payload is not None],
         "symbols": _symbols(decoding),
         "p_value": evidence.p_value,
         "threshold": decoding.settings.threshold,
@@ -46,12 +49,14 @@ def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, .
             "frames": recording.frames,
             "speed": recording.speed,
         },
+        "rests_on": list(basis.sentences),
+        "late_s": late_s(decoding),
         "warnings": list(warnings),
     }
     return json.dumps(report, indent=2, allow_nan=False) + "\n"
 
 
-def _frame(frame: Delivered, decoding: Decoding) -> dict[str, Any]:
+def _frame(frame: Delivered, decoding: Decoding, basis: Basis) -> dict[str, Any]:
     """One framed message; bytes are written as hexadecimal digits."""
     message, framing = frame.message, decoding.scheme.framing
     rolling = decoding.scheme.schedule == "rolling"
@@ -62,7 +67,7 @@ def _frame(frame: Delivered, decoding: Decoding) -> dict[str, Any]:
         "check": message.check,
         "check_bits": message.check_bits,
         "check_passed": message.check_passed,
-        "authenticated": message.authenticated,
+        "authenticated": message.authenticated and basis.authenticates,
         "false_acceptance": message.false_acceptance,
         "posterior": message.posterior,
         "epoch": message.epoch,

@@ -10,15 +10,19 @@ from rich.text import Text
 
 from mtm_audit.decoding.decoding import ChannelDecoding, Decoding
 from mtm_audit.model.recording import Recording
+from mtm_audit.reporting.basis import Basis
 from mtm_audit.reporting.delivery import clock_sentence, frame_sentences, payload_text
 from mtm_onboard.protocol.framing import payload_bits
 
+_NO_BASIS = Basis()
 _COLOURS = {"decoded": "bold green", "absent": "bold red", "inconclusive": "bold yellow"}
 
 
-def print_report(console: Console, recording: Recording, decoding: Decoding, warnings: Sequence[str]) -> None:
-    """Print verdict, evidence, channels and warnings."""
-    console.print(_report(recording, decoding, warnings), highlight=False)
+def print_report(
+    console: Console, recording: Recording, decoding: Decoding, warnings: Sequence[str], basis: Basis = _NO_BASIS
+) -> None:
+    """Print verdict, what it rests on, evidence, channels and warnings."""
+    console.print(_report(recording, decoding, warnings, basis), highlight=False)
 
 
 def verdict_sentence(decoding: Decoding) -> str:
@@ -110,7 +114,7 @@ def rarity(probability: float) -> str:
     return f"1 in {odds:,.0f}" if odds < 1e7 else f"1 in {odds:.0e}".replace("e+", "e")
 
 
-def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str]) -> RenderableType:
+def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str], basis: Basis) -> RenderableType:
     scheme = decoding.scheme
     parts: list[RenderableType] = [
         Text(verdict_sentence(decoding), style=_COLOURS[decoding.verdict]),
@@ -118,7 +122,8 @@ def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str]) -
         *(
             Text(sentence)
             for sentence in (
-                *frame_sentences(decoding),
+                *frame_sentences(decoding, authenticates=basis.authenticates),
+                *basis.sentences,
                 clock_sentence(decoding),
                 search_sentence(recording, decoding),
             )

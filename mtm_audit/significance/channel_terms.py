@@ -40,9 +40,11 @@ class ChannelTerms:
     `groups` (windows,) numbers the windows that are played from one waveform, `positions` (groups,) says which message
     position each carries. `candidates` (shown positions, k) are the symbols that are looked at, those that score best;
     `tones` (groups, k, injected axes, 2 K) theirs. `shared` when one codebook serves all positions (fixed schedule).
-    `timing` is what all channels together found; `alone` and `strength` are what this one found by itself.
+    `timing` is what all channels together found; `alone` and `strength` are what this one found by itself. Channels of
+    one `name` are parts of one, which carry the same symbols on different axes.
     """
 
+    name: str
     prepared: Prepared
     span: Span
     timing: Timing
@@ -200,6 +202,7 @@ def channel_terms(
     ]
     ticks = scheme.window_ticks(channel)
     return ChannelTerms(
+        name=channel.name,
         prepared=reading.prepared,
         span=Span(
             numbers=found.window_numbers,

@@ -30,7 +30,7 @@ class DecoyComparison:
 def decoy_codebooks(key: Key, count: int, first_slot: int = 0) -> list[Codebook]:
     """Codebooks of keys that nobody holds, derived from this key so that every decode of a file says the same."""
     return [
-        Codebook(stream(key.secret, "decoy", (number,), SECRET_BYTES), key.scheme, first_slot)
+        Codebook(stream(key.holding.decoy_seed(), "decoy", (number,), SECRET_BYTES), key.scheme, first_slot)
         for number in range(count)
     ]
 

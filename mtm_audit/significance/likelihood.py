@@ -36,8 +36,9 @@ def approximate_log_e(
 ) -> Floats:
     """Log e-values of pairs of a timing and a plant: (pairs, levels, orientations, groups, candidates).
 
-    `tones` (groups, candidates, injected axes, 2 K); `timings` and `plants` (pairs,). With every observed axis taken to
-    be seen alike and tones to be normal: to choose hypotheses and to weigh them, never as evidence.
+    `tones` (groups, candidates, injected axes, 2 K); `timings` and `plants` (pairs,). With observed axes that leave
+    each other's precision alone and tones taken to be normal: to choose hypotheses and to weigh them, never as
+    evidence.
     """
     groups, candidates = tones.shape[:2]
     each = len(levels.magnitudes) * len(turns) * groups * candidates
@@ -53,25 +54,25 @@ def approximate_log_e(
 def _approximate(
     projections: Projections, tones: Floats, levels: Levels, turns: Floats, timings: Integers, plants: Integers
 ) -> Floats:
-    count = projections.power.shape[1]
+    count = projections.power.shape[-1]
     power = np.tile(projections.power[plants], 2)
-    factors = np.tile(precision_factors(levels, projections.power[plants], projections.cells), 2)
+    factors = np.tile(precision_factors(levels, projections.power[plants].mean(axis=1), projections.cells), 2)
     linear = projections.linear[timings, plants]
-    seen = projections.seen[timings].mean(axis=-1)
-    magnitudes = levels.magnitudes[:, None, None]
-    unit = 0.5 * magnitudes**2 * factors * power
-    quadratic = unit[:, :, None] * seen[None, :, :, None]
-    total = count + quadratic
+    seen = projections.seen[timings]
+    magnitudes = levels.magnitudes[:, None, None, None]
+    unit = 0.5 * magnitudes**2 * factors[:, :, None] * power
+    quadratic = unit[:, :, None] * seen[None, ..., None]
     weighted = factors[:, :, None, None] * linear
     found = np.einsum("lpgok,gcak->lpgoac", weighted, tones, optimize=True)
-    spent = np.einsum("lpk,gcak->lpgc", unit, tones**2, optimize=True) * seen[None, :, :, None]
-    moments = np.einsum("lpgok,lpgqk,lpgk->lpgoq", weighted, weighted, 1.0 / total, optimize=True)
-    moments *= magnitudes[..., None, None] ** 2
-    aligned = np.einsum("roa,lpgoac->lprgc", turns, found, optimize=True) * magnitudes[..., None, None]
+    spent = np.einsum("lpok,gcak->lpgoac", unit, tones**2, optimize=True) * seen[None, ..., None, None]
+    scaled = weighted / np.sqrt(count + quadratic) * magnitudes[..., None]
+    moments = np.einsum("lpgok,lpgqk->lpgoq", scaled, scaled, optimize=True)
+    squared = turns**2
+    aligned = np.einsum("roa,lpgoac->lprgc", turns, found, optimize=True) * magnitudes[..., None]
+    aligned -= 0.5 * np.einsum("roa,lpgoac->lprgc", squared, spent, optimize=True)
     curved = 0.5 * np.einsum("roa,rqa,lpgoq->lprg", turns, turns, moments, optimize=True)
-    curved -= 0.5 * turns.shape[2] * np.log1p(quadratic / count).sum(axis=-1)[:, :, None]
-    result = aligned - 0.5 * spent[:, :, None] - curved[..., None]
-    return np.asarray(result.transpose(1, 0, 2, 3, 4))
+    curved -= 0.5 * np.einsum("roa,lpgo->lprg", squared, np.log1p(quadratic / count).sum(axis=-1), optimize=True)
+    return np.asarray((aligned - curved[..., None]).transpose(1, 0, 2, 3, 4))
 
 
 def log_e(
@@ -94,10 +95,11 @@ def weights(projections: Projections, levels: Levels, turns: Floats, chosen: Hyp
     """U and q of each hypothesis, group and injected axis: (hypotheses, groups, axes, 2 K) each."""
     power = projections.power[chosen.plants]
     magnitudes, reliefs = levels.magnitudes[chosen.levels], levels.reliefs[chosen.levels]
-    share = precision_factors(Levels(magnitudes, reliefs, magnitudes), projections.power, projections.cells)
+    mean_power = projections.power.mean(axis=1)
+    share = precision_factors(Levels(magnitudes, reliefs, magnitudes), mean_power, projections.cells)
     factors = np.tile(share[np.arange(len(magnitudes)), chosen.plants], 2)
     gains = magnitudes[:, None, None] * turns[chosen.turns]
     linear = np.einsum("hoa,hgok->hgak", gains, projections.linear[chosen.timings, chosen.plants], optimize=True)
-    seen = np.einsum("hoa,hgo->hga", gains**2, projections.seen[chosen.timings], optimize=True)
-    spread = 0.5 * factors * np.tile(power, 2)
-    return linear * factors[:, None, None], seen[..., None] * spread[:, None, None]
+    spread = 0.5 * factors[:, None] * np.tile(power, 2)
+    quadratic = np.einsum("hoa,hgo,hok->hgak", gains**2, projections.seen[chosen.timings], spread, optimize=True)
+    return linear * factors[:, None, None], quadratic

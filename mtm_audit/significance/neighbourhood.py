@@ -13,6 +13,7 @@ from mtm_audit.model.track import Floats
 _EARLIEST_S, _LATEST_S = -0.04, 0.42
 _SHIFTS = np.arange(-4, 5)
 _RATE_STEPS = np.arange(-2, 3)
+RATES = len(_RATE_STEPS)
 # Clocks that are off by more are possible but rare: the scale of a Cauchy prior over relative rates.
 _USUAL_RATE_ERROR = 0.003
 
@@ -36,7 +37,8 @@ class Span:
 
 @dataclass(frozen=True)
 class Neighbourhood:
-    """`starts_s` (timings, windows), and the log prior probability of each timing, (timings,).
+    """`starts_s` (timings, windows), and the log prior probability of each timing, (timings,): for each shift of the
+    onset `RATES` rates.
 
     All timings of the grid, of which these are a part, have a prior of sum 1 at the most.
     """

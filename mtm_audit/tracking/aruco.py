@@ -1,127 +1,131 @@
-"""Tracking ArUco markers: where each marker is, to a small fraction of a pixel, and where it points."""
+"""Tracking markers: where each is, to a small fraction of a pixel, and where it points."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
 from typing import Literal
 
-import cv2
-import numpy as np
-
 from mtm_audit.model.picture import Frame, Image
-from mtm_audit.model.track import Floats, Track
-from mtm_audit.tracking.gather import Gather, Progress, steady
+from mtm_audit.model.track import Track
+from mtm_audit.tracking.dictionaries import USUAL, dictionary_of, shown_instead
+from mtm_audit.tracking.follower import MarkerFollower
+from mtm_audit.tracking.gather import Progress, steady
 from mtm_onboard.protocol.errors import MtmError
 
-FULL_SEARCH_EVERY = 15  # frames after which the whole picture is searched for markers that are new
-SEEN_AT_LEAST = 3  # frames; what is read less often is a chance reading of something else
+# One way of reading the pictures is right when it leads by so many markers, or by so many sightings of one.
+_LEAD_MARKERS, _LEAD_SIGHTINGS = 3, 30
+_MOST_KEPT = 6  # pictures in which other dictionaries are looked for, when they hold no marker of the chosen one
 
-Found = dict[int, Floats]
 
-
-@dataclass(frozen=True)
-class _Followed:
-    """A marker's corners (4, 2) in the last frame, and how far they had moved since the frame before it."""
-
-    corners: Floats
-    step: Floats
+def parse_aruco(choice: str, warn: Callable[[str], None] | None = None) -> "ArucoTracker":
+    """The tracker `aruco[:<dictionary>][,mirrored]`; raises MtmError for anything else."""
+    parts = [part.strip().lower().removeprefix("dict_") for part in choice.split(",") if part.strip()]
+    mirrored = "mirrored" in parts
+    names = [part for part in parts if part != "mirrored"]
+    if len(names) > 1 or len(parts) > len(names) + 1:
+        raise MtmError(
+            f"aruco:{choice} names more than one dictionary; write one, such as aruco:6x6_250 or aruco:6x6_250,mirrored"
+        )
+    return ArucoTracker(True if mirrored else None, names[0] if names else USUAL, warn)
 
 
 class ArucoTracker:
-    """Follows markers of OpenCV's 4x4 dictionary of 50, searching around where each is expected.
+    """Follows markers of one of OpenCV's dictionaries, searching around where each is expected.
 
     A marker in a mirrored picture cannot be read until the picture is flipped back. With `mirrored` None both ways
-    are tried on every frame until one reads markers; tracks are in pixels of the picture that can be read.
+    are tried until one reads more markers that look different in a mirror; tracks are in pixels of the picture that
+    can be read. `warn` receives a sentence when that cannot be told, and when a marker is there more than once.
     """
 
     pixels: Literal["gray", "bgr"] = "gray"
 
-    def __init__(self, mirrored: bool | None = None) -> None:
-        self._mirrored = mirrored
-        self._thorough = _detector()
-        self._quick = _detector(threshold_window_px=15)
+    def __init__(
+        self, mirrored: bool | None = None, dictionary: str = USUAL, warn: Callable[[str], None] | None = None
+    ) -> None:
+        dictionary_of(dictionary)
+        self._mirrored, self._dictionary, self._warn = mirrored, dictionary, warn or (lambda sentence: None)
+        self.flipped = bool(mirrored)
 
     def track(self, frames: Iterable[Frame], progress: Progress | None = None) -> list[Track]:
         """Track every marker in gray `frames`: one track per marker, `marker<id>`, in pixels with y up, with headings.
 
-        Raises MtmError when no marker is found or the size of the picture changes.
+        Raises MtmError, which names markers of other dictionaries that are there instead, when no marker is found, and
+        when the size of the picture changes.
         """
-        gather = Gather()
-        followed: dict[int, _Followed] = {}
-        known: set[int] = set()
-        mirrored = self._mirrored
-        for number, frame in enumerate(steady(frames, progress)):
-            gather.next_frame(frame)
-            if mirrored is None:
-                mirrored = self._find_mirroring(frame.image)
-            image = np.ascontiguousarray(frame.image[:, ::-1]) if mirrored else frame.image
-            found = self._search_near(image, followed)
-            if not known or len(found) < len(known) or number % FULL_SEARCH_EVERY == 0:
-                found = self._search(image) | found
-                known |= found.keys()
-            for marker, corners in found.items():
-                gather.put(f"marker{marker}", *_pose(corners))
-            followed = {marker: _follow(followed.get(marker), corners) for marker, corners in found.items()}
-        tracks = [track for track in gather.tracks(with_headings=True) if track.valid.sum() >= SEEN_AT_LEAST]
+        ways = (False, True) if self._mirrored is None else (self._mirrored,)
+        followers = {way: MarkerFollower(self._dictionary, mirrored=way) for way in ways}
+        kept = _Kept()
+        count = 0
+        for frame in steady(frames, progress):
+            count += 1
+            for follower in followers.values():
+                follower.look(frame)
+            if not any(follower.sightings for follower in followers.values()):
+                kept.offer(frame.image)
+            elif len(followers) > 1 and (way := _leader(followers)) is not None:
+                followers = {way: followers[way]}
+        # When nothing tells, the picture is most likely as it was taken.
+        self.flipped = max(followers, key=lambda way: (sum(followers[way].decisive.values()), not way))
+        tracks = followers[self.flipped].tracks()
         if not tracks:
-            raise MtmError(
-                f"no marker found in {len(gather.times_s)} frames; film markers of OpenCV's 4x4 dictionary of 50 with "
-                "a white margin, at least 20 pixels wide, or choose another tracker"
+            raise MtmError(self._refusal(count, kept.images))
+        if len(followers) > 1 and not followers[self.flipped].decisive:
+            self._warn(
+                f"only markers that look the same in a mirror are seen ({_listed(tracks)}), so nothing tells whether "
+                f"the film is mirrored; if it is, name the tracker aruco:{self._dictionary},mirrored"
             )
+        self._warn_of_copies(tracks)
         return tracks
 
-    def _find_mirroring(self, image: Image) -> bool | None:
-        """Whether the flipped picture reads more markers; None when neither reads any."""
-        plain, flipped = len(self._search(image)), len(self._search(np.ascontiguousarray(image[:, ::-1])))
-        return flipped > plain if plain or flipped else None
+    def _refusal(self, count: int, images: list[Image]) -> str:
+        instead = shown_instead(images, self._dictionary)
+        if instead is not None:
+            name = instead.split()[0]
+            return (
+                f"no marker of {self._dictionary} found in {count} frames, but {instead} there; decode with "
+                f"--tracker aruco:{name}"
+            )
+        return (
+            f"no marker found in {count} frames; film markers of OpenCV's dictionary {self._dictionary} with a white "
+            "margin, at least 20 pixels wide, or choose another tracker"
+        )
 
-    def _search(self, image: Image, quick: bool = False) -> Found:
-        """Corners (4, 2) of every marker in the picture, by number; a marker seen twice counts where it is largest."""
-        quads, numbers, _ = (self._quick if quick else self._thorough).detectMarkers(image)
-        corners = [np.asarray(quad, dtype=np.float64).reshape(4, 2) for quad in quads]
-        order = sorted(range(len(corners)), key=lambda index: float(np.ptp(corners[index], axis=0).sum()))
-        return {int(np.ravel(numbers[index])[0]): corners[index] for index in order}
-
-    def _search_near(self, image: Image, followed: dict[int, _Followed]) -> Found:
-        """The followed markers that are where they are expected, at constant velocity, within half their width."""
-        found: Found = {}
-        for marker, last in followed.items():
-            expected = last.corners + last.step
-            low, high = expected.min(axis=0), expected.max(axis=0)
-            margin = 0.5 * (high - low).max() + 6
-            left, upper = np.maximum(low - margin, 0).astype(int)
-            right, lower = np.maximum(high + margin, 0).astype(int)
-            window = image[upper:lower, left:right]
-            if min(window.shape) > 16:
-                window = np.ascontiguousarray(window)
-                near = self._search(window, quick=True)
-                near = near if marker in near else self._search(window)
-                if marker in near:
-                    found[marker] = near[marker] + np.array([left, upper])
-        return found
+    def _warn_of_copies(self, tracks: list[Track]) -> None:
+        names = {track.name for track in tracks}
+        for name in sorted(names):
+            if name[-1].isdigit() and (copies := sorted(other for other in names if other.rstrip("b-z") == name)):
+                others = [copy for copy in copies if copy != name]
+                if others:
+                    self._warn(
+                        f"the marker {name.removeprefix('marker')} is in sight {len(copies)} times: {name} is the one "
+                        f"that moves most, {' and '.join(others)} what hangs elsewhere; cover that, or use --assign"
+                    )
 
 
-def _detector(threshold_window_px: int | None = None) -> cv2.aruco.ArucoDetector:
-    """A detector that binarises the picture over one window size, or over three (slower, and loses fewer markers)."""
-    parameters = cv2.aruco.DetectorParameters()
-    if threshold_window_px is not None:
-        parameters.adaptiveThreshWinSizeMin = parameters.adaptiveThreshWinSizeMax = threshold_window_px
-    parameters.minMarkerPerimeterRate = 0.02
-    # Lines fitted to the sides measure small markers three times better than corner refinement does.
-    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
-    return cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), parameters)
+class _Kept:
+    """Some pictures of a film, evenly spread however long it gets."""
+
+    def __init__(self) -> None:
+        self.images: list[Image] = []
+        self._every = 1
+        self._count = 0
+
+    def offer(self, image: Image) -> None:
+        if self._count % self._every == 0:
+            self.images.append(image.copy())
+            if len(self.images) > _MOST_KEPT:
+                self.images, self._every = self.images[::2], 2 * self._every
+        self._count += 1
 
 
-def _follow(last: _Followed | None, corners: Floats) -> _Followed:
-    return _Followed(corners, corners - last.corners if last else np.zeros((4, 2)))
+def _leader(followers: dict[bool, MarkerFollower]) -> bool | None:
+    """Whether the mirrored way of reading leads; None while neither does."""
+    for way in followers:
+        ahead = followers[way].decisive - followers[not way].decisive
+        if len(ahead) >= _LEAD_MARKERS or sum(ahead.values()) >= _LEAD_SIGHTINGS:
+            behind = followers[not way].decisive - followers[way].decisive
+            if sum(ahead.values()) > 2 * sum(behind.values()):
+                return way
+    return None
 
 
-def _pose(corners: Floats) -> tuple[float, float, float]:
-    """Column and row of the middle, where the diagonals cross, and the heading of the marker's upper edge, y up.
-
-    The crossing is the image of the marker's middle under any perspective; the mean of the corners is not.
-    """
-    one, other = corners[2] - corners[0], corners[3] - corners[1]
-    share = np.linalg.det(np.stack([corners[1] - corners[0], other])) / np.linalg.det(np.stack([one, other]))
-    column, row = corners[0] + share * one
-    along = corners[1] - corners[0] + corners[2] - corners[3]
-    return float(column), float(row), float(np.arctan2(-along[1], along[0]))
+def _listed(tracks: list[Track]) -> str:
+    return ", ".join(track.name.removeprefix("marker") for track in tracks)

@@ -8,12 +8,18 @@ import numpy as np
 
 from mtm_audit.model.picture import Frame, Image
 from mtm_audit.model.track import Track
-from mtm_audit.tracking.cover import COVERED, Cover, cover_of
+from mtm_audit.tracking.cover import COVERED, Cover, DriftingCover, cover_of
 from mtm_audit.tracking.gather import Gather, Progress, steady
 from mtm_onboard.protocol.errors import MtmError
 
 FULL_SEARCH_EVERY = 15
 LEAST_AREA_PX = 12
+COARSE_STEP, MOST_CLOSE_LOOKS = 3, 3
+# A colour out of sight is looked for in each of so many frames, then in every fourth; and now and then in all pixels.
+EAGER_FRAMES, SELDOM_EVERY = 15, 4
+THOROUGH_EVERY = 120
+LEARNT_EVERY = 5  # frames; light and white balance drift over seconds
+BODY_EXTENTS = 2.5  # a robot's body reaches beyond its patch, and its shadow beyond that
 
 Window = tuple[slice, slice]
 
@@ -33,7 +39,9 @@ class ColourTracker:
         self, colours: tuple[str, ...], search_every: int = FULL_SEARCH_EVERY, least_share: float = 0.0
     ) -> None:
         self._search_every, self._least_share = search_every, least_share
-        self._covers = {name: cover_of(name) for name in colours}
+        self._colours = colours
+        for name in colours:
+            cover_of(name)
 
     def track(self, frames: Iterable[Frame], progress: Progress | None = None) -> list[Track]:
         """Track in `frames` of blue, green and red: one track per colour, named after it, in pixels with y up.
@@ -42,20 +50,27 @@ class ColourTracker:
         """
         gather = Gather()
         windows: dict[str, Window] = {}
-        areas: dict[str, list[float]] = {name: [] for name in self._covers}
+        covers = {name: DriftingCover(name) for name in self._colours}
+        lost = dict.fromkeys(self._colours, 0)
+        areas: dict[str, list[float]] = {name: [] for name in self._colours}
         for number, frame in enumerate(steady(frames, progress)):
             gather.next_frame(frame)
-            for name, cover in self._covers.items():
+            for name, cover in covers.items():
                 window = windows.pop(name, None)
                 patch = _patch(frame.image, cover, window) if window and number % self._search_every else None
-                patch = patch or _patch(frame.image, cover, (slice(0, None), slice(0, None)))
+                if patch is None and _is_looked_for(lost[name]):
+                    patch = _searched(frame.image, cover, thoroughly=lost[name] % THOROUGH_EVERY == 0)
+                lost[name] = 0 if patch else lost[name] + 1
                 if patch is not None:
                     column, row, area, windows[name] = patch
-                    gather.put(name, column, row)
+                    gather.put(name, column, row, extent_px=BODY_EXTENTS * float(np.sqrt(area)))
                     areas[name].append(area)
+                    if number % LEARNT_EVERY == 0:
+                        near = np.ascontiguousarray(frame.image[windows[name]][::2, ::2])
+                        cover.learn(near, cover(near))
         if not gather.seen:
             raise MtmError(
-                f"none of {', '.join(self._covers)} found in {len(gather.times_s)} frames; name the colour that the "
+                f"none of {', '.join(self._colours)} found in {len(gather.times_s)} frames; name the colour that the "
                 "robot has in the picture, for instance as #rrggbb"
             )
         for name, sightings in gather.seen.items():
@@ -64,6 +79,36 @@ class ColourTracker:
                 if area < least:
                     del sightings[row_number]
         return gather.tracks(with_headings=False)
+
+
+def _is_looked_for(lost: int) -> bool:
+    """Whether a colour that was not seen for so many frames is looked for in the next."""
+    return lost < EAGER_FRAMES or lost % SELDOM_EVERY == 0
+
+
+def _searched(image: Image, cover_in: Cover, *, thoroughly: bool) -> tuple[float, float, float, Window] | None:
+    """The largest patch in the whole picture, as `_patch` has it.
+
+    Every third pixel in each direction tells where to look closely; `thoroughly` does so everywhere, for patches that
+    fall through.
+    """
+    if thoroughly:
+        return _patch(image, cover_in, (slice(0, None), slice(0, None)))
+    coarse = np.ascontiguousarray(image[::COARSE_STEP, ::COARSE_STEP])
+    shown = (cover_in(coarse) > COVERED).astype(np.uint8)
+    if not shown.any():
+        return None
+    _, _, boxes, _ = cv2.connectedComponentsWithStats(shown, connectivity=8)
+    patches = []
+    for index in 1 + np.argsort(-boxes[1:, cv2.CC_STAT_AREA])[:MOST_CLOSE_LOOKS]:
+        x, y, width, height = (COARSE_STEP * int(value) for value in boxes[index, : cv2.CC_STAT_AREA])
+        margin = 3 * COARSE_STEP
+        rows = slice(max(y - margin, 0), y + height + margin)
+        columns = slice(max(x - margin, 0), x + width + margin)
+        patch = _patch(image, cover_in, (rows, columns))
+        if patch is not None:
+            patches.append(patch)
+    return max(patches, key=lambda patch: patch[2], default=None)
 
 
 def _patch(image: Image, cover_in: Cover, window: Window) -> tuple[float, float, float, Window] | None:

@@ -25,9 +25,49 @@ LEAST_CHROMA = 20.0
 # Largest hue, saturation and value in OpenCV's HSV of eight bits, whose hues are steps of two degrees.
 LARGEST_HSV = (180, 255, 255)
 COVERED = 0.35  # the least cover of a pixel that belongs to a patch
+# What a drifting colour is learnt from: pixels that it covers, pixels that it does not, and at least so many of each.
+FULLY_COVERED, HARDLY_COVERED, LEAST_LEARNT_PX = 0.6, 0.1, 12
+LEARNT_SHARE = 0.3  # of what is seen each time
+MOST_TURNED = 0.6  # the cosine of the angle by which a hue may drift from its name
 
 # From a picture (height, width, 3) in blue, green and red to the cover of its pixels (height, width).
 Cover = Callable[[Image], NDArray[np.float32]]
+
+
+class DriftingCover:
+    """The cover of a colour, which follows it while the light or the camera's white balance drifts.
+
+    How the patch and what is around it have changed since the first sighting is added to what the colour's name says.
+    A range of HSV stays as it is.
+    """
+
+    def __init__(self, colour: str) -> None:
+        self._cover = cover_of(colour)
+        self._drifts = not colour.lower().startswith("hsv")
+        self._named = CHROMA @ parse_colour(colour) if self._drifts else np.zeros(2)
+        self._first: NDArray[np.float64] | None = None
+        self._drift = np.zeros((2, 2))
+
+    def __call__(self, image: Image) -> NDArray[np.float32]:
+        """The cover of a picture's pixels as `cover_of` gives it, by the colour as it last was."""
+        return self._cover(image)
+
+    def learn(self, image: Image, cover: NDArray[np.float32]) -> None:
+        """See the colour and its surroundings as they are now: a window of the picture and its cover."""
+        if not self._drifts:
+            return
+        own, around = cover > FULLY_COVERED, cover < HARDLY_COVERED
+        if min(np.count_nonzero(own), np.count_nonzero(around)) < LEAST_LEARNT_PX:
+            return
+        now = np.stack([CHROMA @ np.median(image[pixels], axis=0) for pixels in (own, around)])
+        if self._first is None:
+            self._first = now
+        self._drift += LEARNT_SHARE * (now - self._first - self._drift)
+        reference, origin = self._named + self._drift[0], self._drift[1]
+        towards = reference - origin
+        cosine = float(towards @ self._named) / float(np.linalg.norm(towards) * np.linalg.norm(self._named) + 1e-9)
+        if cosine > MOST_TURNED and np.linalg.norm(towards) > LEAST_CHROMA:
+            self._cover = _hue_cover(towards, origin)
 
 
 def split_colours(text: str) -> tuple[str, ...]:
@@ -63,10 +103,11 @@ def parse_colour(text: str) -> tuple[int, int, int]:
     return bgr
 
 
-def _hue_cover(reference: NDArray[np.float64]) -> Cover:
-    length = float(np.linalg.norm(reference))
-    towards, across = reference / length**2 @ CHROMA, np.array([-reference[1], reference[0]]) / length**2 @ CHROMA
-    axes = np.stack([towards, across]).astype(np.float32)
+def _hue_cover(reference: NDArray[np.float64], origin: NDArray[np.float64] | None = None) -> Cover:
+    """The cover of the chroma `reference`, counted from the chroma `origin` of what lies around (gray for None)."""
+    scaled = np.stack([reference, [-reference[1], reference[0]]]) / float(reference @ reference)
+    offsets = np.zeros(2) if origin is None else scaled @ origin
+    axes = np.column_stack([scaled @ CHROMA, -offsets]).astype(np.float32)
 
     def cover(image: Image) -> NDArray[np.float32]:
         parts = cv2.transform(image.astype(np.float32), axes)

@@ -21,6 +21,8 @@ RENEWED_BELOW = 0.6  # the share of a sight's first corners under which new ones
 RETURN_ERROR_PX = 0.7  # how far from its start a corner may end that is followed there and back
 OFF_BODY_PX = 2.0
 MARGIN_PX = 40
+BODY_EXTENTS = 1.5  # a body may reach beyond the region
+BODY_EXTENTS = 1.5  # a body may reach beyond the region
 WINDOW_PX, LEVELS = (15, 15), 2
 # What was lost is looked for at half resolution, turned by these angles; a correlation of so much is worth a try.
 TURNS_RAD = 0.15 * np.arange(-4, 5)
@@ -77,7 +79,8 @@ class FlowTracker:
             lost = 0 if found else lost + 1
             if found is not None:
                 sight = found
-                gather.put(TRACK_NAME, *map(float, found.centre))
+                column, row = float(found.centre[0]), float(found.centre[1])
+                gather.put(TRACK_NAME, column, row, extent_px=BODY_EXTENTS * 2.0 * max(self._half(0), self._half(1)))
         if sight is None:
             raise MtmError("the video holds no frame to follow anything in; record it anew")
         if len(gather.seen[TRACK_NAME]) < 2:

@@ -22,14 +22,19 @@ class Gather:
     height_px: int = 0
     times_s: list[float] = field(default_factory=list)
     seen: dict[str, dict[int, tuple[float, float, float]]] = field(default_factory=dict)
+    extents_px: dict[str, float] = field(default_factory=dict)
 
     def next_frame(self, frame: Frame) -> None:
         """Open the row of the next frame."""
         self.height_px = frame.size[1]
         self.times_s.append(frame.time_s)
 
-    def put(self, name: str, column: float, row: float, heading_rad: float = np.nan) -> None:
-        """Note where a body is in the current frame: picture coordinates (y down), heading counter-clockwise."""
+    def put(self, name: str, column: float, row: float, heading_rad: float = np.nan, extent_px: float = 0.0) -> None:
+        """Note where a body is in the current frame: picture coordinates (y down), heading counter-clockwise.
+
+        `extent_px` is how large it is, 0 where that is not known; the largest of a film counts.
+        """
+        self.extents_px[name] = max(extent_px, self.extents_px.get(name, 0.0))
         self.seen.setdefault(name, {})[len(self.times_s) - 1] = (column, self.height_px - 1 - row, heading_rad)
 
     def tracks(self, with_headings: bool) -> list[Track]:
@@ -41,7 +46,10 @@ class Gather:
             table[list(self.seen[name])] = list(self.seen[name].values())
             valid = np.asarray(np.isfinite(table[:, 0]))
             headings = table[:, 2] if with_headings else None
-            found.append(Track(name, times_s, table[:, :2], valid, unit="px", headings_rad=headings))
+            extent_px = self.extents_px.get(name) or None
+            found.append(
+                Track(name, times_s, table[:, :2], valid, unit="px", headings_rad=headings, extent_px=extent_px)
+            )
         return found
 
 

@@ -1,6 +1,6 @@
 """Trackers by name."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Protocol
 
 from mtm_audit.model.picture import Frame, Pixels
@@ -10,8 +10,7 @@ from mtm_onboard.protocol.errors import MtmError
 
 TRACKERS = ", ".join(
     [
-        "aruco",
-        "aruco:mirrored",
+        "aruco[:<dictionary, such as 6x6_250>][,mirrored]",
         "colour:<name, #rrggbb or hsv(H-H,S-S,V-V)>[,<another>...]",
         "centroid:<colour>[,<reach>]",
         "brightness[:<x0>,<y0>,<x1>,<y1>[,<threshold>]]",
@@ -32,13 +31,16 @@ class Tracker(Protocol):
         ...
 
 
-def tracker(name: str) -> Tracker:
-    """The tracker of that name, such as `aruco` or `colour:red,#00ffff` (`TRACKERS`); raises MtmError for others."""
-    kind, _, choice = name.partition(":")
-    if kind == "aruco" and choice in ("", "mirrored"):
-        from mtm_audit.tracking.aruco import ArucoTracker
+def tracker(name: str, warn: Callable[[str], None] | None = None) -> Tracker:
+    """The tracker of that name, such as `aruco` or `colour:red,#00ffff` (`TRACKERS`).
 
-        return ArucoTracker(mirrored=True if choice else None)
+    `warn` receives one sentence for each thing that it cannot tell. Raises MtmError for other names.
+    """
+    kind, _, choice = name.partition(":")
+    if kind == "aruco":
+        from mtm_audit.tracking.aruco import parse_aruco
+
+        return parse_aruco(choice, warn)
     if kind == "colour" and choice:
         from mtm_audit.tracking.colour import ColourTracker
         from mtm_audit.tracking.cover import split_colours
@@ -65,3 +67,8 @@ def tracker(name: str) -> Tracker:
 
         return parse_flow(choice)
     raise MtmError(f"there is no tracker {name!r}; choose one of: {TRACKERS}")
+
+
+def is_flipped(tracker: Tracker) -> bool:
+    """Whether the tracks that it made are those of the mirrored pictures."""
+    return bool(getattr(tracker, "flipped", False))

@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
         first_message=args.first_message,
         messages=messages,
     )
-    data = image_bytes(tagged(image, key.secret))
+    data = image_bytes(tagged(image, key.holding.decoy_seed()))
     with replacing(args.out, mode=0o600) as temporary:
         temporary.write_bytes(data)
     seconds = image.samples.shape[1] / scheme.rate_hz

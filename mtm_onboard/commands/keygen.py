@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mtm_onboard.commands.dayoptions import add_days, first_day
+
 if TYPE_CHECKING:
     from mtm_onboard.protocol import Channel, Scheme
     from mtm_onboard.protocol.framing import Framing
@@ -19,6 +21,8 @@ _PRESETS: dict[str, dict[str, Any]] = {
         "power": "window",
     }
 }
+# Ten years, leap days included.
+_USUAL_DAYS = 3653
 _REQUIRED = ("name", "rate", "band", "alphabet", "message_ticks", "channel")
 _CHOSEN_BY_SCHEME = ("combine", "pooling", "power", "schedule", "epoch")
 _FRAMING = ("payload", "number_bits", "check", "code", "interleave")
@@ -45,6 +49,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--power", help="window (default): each window has mean square 1; ensemble: Gaussian samples")
     parser.add_argument("--schedule", help="fixed (default): waveforms come again; rolling: none is played twice")
     parser.add_argument("--epoch", type=int, metavar="N", help="number of the first epoch (0)")
+    add_days(parser, _USUAL_DAYS)
     _add_framing(parser)
     parser.set_defaults(handler=_keygen, usage_error=parser.error)
 
@@ -62,6 +67,7 @@ def _add_framing(parser: argparse.ArgumentParser) -> None:
 
 def _keygen(args: argparse.Namespace) -> int:
     from mtm_onboard.protocol import generate_key, save_key
+    from mtm_onboard.protocol.key import generate_master
     from mtm_onboard.protocol.schemefile import load_scheme
 
     given = {name: getattr(args, name) for name in (*_REQUIRED, *_CHOSEN_BY_SCHEME, *_FRAMING)}
@@ -71,8 +77,18 @@ def _keygen(args: argparse.Namespace) -> int:
         args.usage_error("--scheme gives the whole scheme; leave out --preset and the options for its parts")
     else:
         scheme = load_scheme(args.scheme)
-    save_key(generate_key(args.id, scheme), args.out)
-    print(f"wrote key {args.id} to {args.out} (scheme {scheme.fingerprint}); keep it secret")
+    if scheme.schedule == "fixed":
+        save_key(generate_key(args.id, scheme), args.out)
+        print(f"wrote key {args.id} to {args.out} (scheme {scheme.fingerprint}); keep it secret")
+        return 0
+    key = generate_master(args.id, scheme, first_day(args), args.days)
+    save_key(key, args.out)
+    grant = key.holding.grant
+    assert grant is not None
+    print(
+        f"wrote master {args.id} to {args.out} (scheme {scheme.fingerprint}), for {grant.first_day} to "
+        f"{grant.last_day}; keep it secret and apart, and give robots and auditors what mtm-onboard issue cuts from it"
+    )
     return 0
 
 

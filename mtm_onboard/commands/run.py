@@ -27,6 +27,11 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--stdin", action="store_true", help="base commands from standard input; at its end the robot stands still"
     )
+    parser.add_argument(
+        "--allow-unsynchronised", action="store_true",
+        help="rolling schedule: follow this computer's clock although nobody keeps it right, as in a lab",
+    )  # fmt: skip
+    parser.add_argument("--revoked", type=Path, metavar="FILE", help="the list that mtm-onboard revoke keeps")
     parser.set_defaults(handler=_run)
 
 
@@ -35,13 +40,19 @@ def _run(args: argparse.Namespace) -> int:
 
     from mtm_onboard.control.session import Plan, run_session
     from mtm_onboard.protocol import load_key
+    from mtm_onboard.protocol.revocation import load_revocations
     from mtm_onboard.runtime.config import SourceSettings, load_config
     from mtm_onboard.runtime.ending_signals import ending_signals
 
     config, key = load_config(args.config), load_key(args.key)
     if args.stdin:
         config = replace(config, source=SourceSettings("stdin"))
-    plan = Plan(None if args.no_message else content(args), not args.no_repeat, args.start_at, args.duration)
+    if args.revoked is not None:
+        load_revocations(args.revoked).check(key)
+    plan = Plan(
+        None if args.no_message else content(args), not args.no_repeat, args.start_at, args.duration,
+        args.allow_unsynchronised,
+    )  # fmt: skip
     with ending_signals() as asked_to_end:
         outcome = run_session(config, key, plan, asked_to_end, say=_say)
     print(outcome.summary())

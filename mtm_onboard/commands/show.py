@@ -1,6 +1,7 @@
 """`mtm-onboard show`: the scheme of a key file, never its secret."""
 
 import argparse
+from datetime import UTC
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,6 +31,7 @@ def _lines(key: "Key") -> list[str]:
     duration_s = scheme.message_ticks / scheme.rate_hz
     lines = [
         f"key           {key.id}",
+        *_grant_lines(key),
         f"scheme        {scheme.name} (version {scheme.version}, epoch {scheme.epoch})",
         f"fingerprint   {scheme.fingerprint}",
         f"rate          {scheme.rate_hz:g} Hz",
@@ -47,6 +49,26 @@ def _lines(key: "Key") -> list[str]:
             f"{channel.symbols} symbols of {ticks} ticks ({count_bins(ticks, scheme.rate_hz, scheme.band_hz)} tones), "
             f"sigma {channel.sigma:g}"
         )
+    return lines
+
+
+def _grant_lines(key: "Key") -> list[str]:
+    """What the file can do, and until when."""
+    grant = key.holding.grant
+    if grant is None:
+        return ["can do        format 1: read and play every channel on every day"]
+    channels = ", ".join(grant.channels)
+    can = {
+        "master": "issue every file, disclose days, and read and play every channel",
+        "robot": f"play {channels}, and make the fleet's tags",
+        "auditor": f"read {channels}, and so play them as well",
+        "disclosed": f"show anybody what {channels} said",
+    }[grant.kind]
+    lines = [f"file          {grant.kind}, serial {grant.serial}", f"can do        {can}"]
+    days = (grant.last_day - grant.first_day).days + 1
+    lines.append(f"days          {grant.first_day} to {grant.last_day} in UTC ({days})")
+    if grant.not_after is not None:
+        lines.append(f"not after     {grant.not_after.astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC")
     return lines
 
 

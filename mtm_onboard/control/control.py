@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from mtm_onboard.control.slot_watch import Playing
 from mtm_onboard.control.state_log import RunState, named
 from mtm_onboard.journal.journal import Journal
 from mtm_onboard.links.base import Link
@@ -35,13 +36,13 @@ _PATIENCE_S = 2.0
 class Session:
     """The parts of a run that can be asked or told something.
 
-    Tick 0 is at `start_s` on the runtime's clock, whose time `now_s` says, and at `start_unix_s`; under the rolling
-    schedule slot `first_slot` begins there.
+    Tick 0 is at `start_s` on the runtime's clock, whose time `now_s` says. `playing` says what is played by which count
+    of slots, `plays` whether a tick has noise when all is well, `clock_doubt` what was last told of the time of day.
+    `take_number` gives each message its own.
     """
 
     robot: str
     key: Key
-    modulator: Modulator
     guard: Guard
     source: Source
     transport: Link
@@ -49,8 +50,15 @@ class Session:
     journal: Journal | None
     now_s: Callable[[], float]
     start_s: float
-    start_unix_s: float
-    first_slot: int
+    playing: Callable[[], Playing]
+    plays: Callable[[int], bool]
+    clock_doubt: Callable[[], str]
+    take_number: Callable[[], int]
+
+    @property
+    def modulator(self) -> Modulator:
+        """What adds the noise now."""
+        return self.playing().modulator
 
     @property
     def tick(self) -> int:
@@ -74,7 +82,8 @@ class Session:
             intruder=source.intruder,
             message=named(modulator.message),
             waiting=named(modulator.waiting),
-            sends=modulator.sends(self.tick),
+            sends=self.plays(self.tick),
+            clock_doubt=self.clock_doubt(),
         )
 
 
@@ -84,7 +93,6 @@ class Control:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._one_message_at_a_time = threading.Lock()
-        self._messages = 1
         self._answers: dict[str, Callable[[Table], Table]] = {
             "send": self._send, "silence": self._silence, "status": self._status, "stop": self._stop,
         }  # fmt: skip
@@ -109,9 +117,10 @@ class Control:
                 "the robot was stopped for good and no message would be seen; look at it, and start its run anew"
             )
         with self._one_message_at_a_time:
-            message = message_of(content_from_table(content), self._session.key, self._messages)
+            # Without a number of its own first, so that content which does not fit takes none.
+            message = message_of(content_from_table(content), self._session.key)
+            message = message_of(content_from_table(content), self._session.key, self._session.take_number())
             answer = self._queue(message, f"message {message.number} begins here, {message.words}")
-            self._messages += 1
         return answer | {"number": message.number, "content": message.words}
 
     def _silence(self, _: Table) -> Table:
@@ -119,18 +128,22 @@ class Control:
             return self._queue(SILENCE, "silence begins here")
 
     def _queue(self, played: Played, note: str) -> Table:
-        modulator = self._session.modulator
+        playing = self._session.playing()
+        modulator = playing.modulator
         queued = modulator.queue(played)
         tick = queued.start_tick(_PATIENCE_S)
         if tick is None and not modulator.withdraw(queued):
             # It was taken up at this very moment.
             tick = queued.start_tick(_PATIENCE_S)
+        if tick is None and self._session.playing() is not playing:
+            # The time was set, and another modulator plays.
+            return self._queue(played, note)
         if tick is None:
             raise MtmError("the robot's loop stands still and took up nothing; see its status and its link")
         replaced = _name(queued.replaced)
         instead = "" if replaced is None else f", in the place of {called(replaced)}, which never began"
-        self._note(tick, note + instead)
-        return self._when(tick) | {"replaces": replaced}
+        self._note(playing.first_tick + tick, note + instead)
+        return self._when(tick, playing) | {"replaces": replaced}
 
     def _status(self, _: Table) -> Table:
         session, state = self._session, self._session.state()
@@ -146,6 +159,7 @@ class Control:
             "waiting": _name(modulator.waiting),
             "waiting_content": _content(modulator.waiting),
             "silent": not state.sends,
+            "clock": state.clock_doubt or None,
             "stopped": guard.stopped,
             "commands": {
                 "arriving": not state.stale,
@@ -174,10 +188,10 @@ class Control:
         self._note(self._session.tick, "stop over the control socket")
         return {"stopped": True}
 
-    def _when(self, tick: int) -> Table:
-        session, scheme = self._session, self._session.key.scheme
-        slot = session.first_slot + tick // scheme.message_ticks if scheme.schedule == "rolling" else None
-        return {"tick": tick, "unix_s": session.start_unix_s + tick / scheme.rate_hz, "slot": slot}
+    def _when(self, modulator_tick: int, playing: Playing) -> Table:
+        scheme, tick = self._session.key.scheme, playing.first_tick + modulator_tick
+        slot = playing.first_slot + modulator_tick // scheme.message_ticks if scheme.schedule == "rolling" else None
+        return {"tick": tick, "unix_s": playing.start_unix_s + tick / scheme.rate_hz, "slot": slot}
 
     def _note(self, tick: int, text: str) -> None:
         if self._session.journal is not None:

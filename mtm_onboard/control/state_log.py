@@ -21,7 +21,8 @@ class RunState:
     `stopped_by` says why the robot was stopped for good, `link_fault` why the link is down and `link_doubt` why it is
     degraded, each "" when it is not. `command_age_s` is infinite before the
     first base command. `message` and `waiting` say in words what is played and what takes its place at the next
-    boundary, None for nothing; `sends` says whether there is noise at this tick when all is well.
+    boundary, None for nothing; `sends` says whether there is noise at this tick when all is well. `clock_doubt` is what
+    was last told of the time of day, "" when nothing was.
     """
 
     stopped_by: str
@@ -35,6 +36,7 @@ class RunState:
     message: str | None
     waiting: str | None
     sends: bool
+    clock_doubt: str = ""
 
     @property
     def summary(self) -> str:
@@ -64,6 +66,8 @@ def changes(before: RunState | None, now: RunState) -> Iterator[str]:
         yield f"{now.stopped_by}: the robot stands still until the run is started anew"
     if before is None or before.link_up != now.link_up:
         yield "the link is up" if now.link_up else f"the link is down ({now.link_fault or 'no reason known'})"
+    if now.clock_doubt and (before is None or before.clock_doubt != now.clock_doubt):
+        yield now.clock_doubt
     if now.link_doubt != ("" if before is None else before.link_doubt):
         yield f"the link is degraded: {now.link_doubt}" if now.link_doubt else "the link is no longer degraded"
     if not now.stopped_by and (before is None or before.stale != now.stale):

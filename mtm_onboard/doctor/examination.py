@@ -4,9 +4,10 @@ from pathlib import Path
 
 from mtm_onboard.doctor.finding import Finding
 from mtm_onboard.doctor.fit import check_fit
-from mtm_onboard.doctor.host import check_clock, check_loop, check_processors, is_synchronised
+from mtm_onboard.doctor.host import check_clock, check_loop, check_processors
 from mtm_onboard.doctor.link import check_link
 from mtm_onboard.doctor.places import check_control, check_journal, check_key_file, check_source
+from mtm_onboard.model.wall_clock import is_synchronised
 from mtm_onboard.protocol import MtmError, load_key
 from mtm_onboard.runtime.config import load_config
 

@@ -1,6 +1,5 @@
 """The computer: its clock, its processors, and how late its loop wakes."""
 
-import ctypes
 from pathlib import Path
 
 from mtm_onboard.doctor.finding import Finding
@@ -13,29 +12,8 @@ from mtm_onboard.runtime.realtime import realtime
 # Phase errors at the band's top, in degrees: 15 make no difference to the decoding, from 45 on coherence drops.
 _WARN_DEG, _FAIL_DEG = 15.0, 45.0
 _LEAD_S = 0.05
-# From <sys/timex.h>.
-_STA_UNSYNC = 0x0040
 _GOVERNORS = "cpu[0-9]*/cpufreq/scaling_governor"
 _PROCESSORS = Path("/sys/devices/system/cpu")
-
-
-class _Timex(ctypes.Structure):
-    """The beginning of the kernel's `struct timex`; the rest is room."""
-
-    _fields_ = (
-        ("modes", ctypes.c_uint), ("offset", ctypes.c_long), ("freq", ctypes.c_long), ("maxerror", ctypes.c_long),
-        ("esterror", ctypes.c_long), ("status", ctypes.c_int), ("rest", ctypes.c_char * 512),
-    )  # fmt: skip
-
-
-def is_synchronised() -> bool | None:
-    """Whether the kernel reports the clock as synchronised; None when it does not say."""
-    state = _Timex()
-    try:
-        answer = ctypes.CDLL(None).adjtimex(ctypes.byref(state))
-    except AttributeError:
-        return None
-    return None if answer < 0 else not state.status & _STA_UNSYNC
 
 
 def check_clock(schedule: str, synchronised: bool | None) -> Finding:

@@ -16,14 +16,17 @@ from typing import Self
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.journal_file import (
+    NOISE,
     Event,
     JournalHeader,
     JournalRecord,
+    PlayedSlot,
     event_line,
     heading,
     kept_segment,
     read_journal,
     segments,
+    slot_line,
 )
 
 __all__ = ["Journal", "JournalHeader", "JournalRecord", "read_journal"]
@@ -45,17 +48,27 @@ class Journal:
     """Writes one run; `threaded` hands the writing to a thread, as real time needs, and else `append` does it.
 
     At most `max_bytes` are kept, in eight segments of which the oldest gives way. An existing journal is kept: the new
-    one gets the next free number before its suffix, see `path`. Raises MtmError when the file cannot be opened.
+    one gets the next free number before its suffix, see `path`. Its owner alone can read it.
+    With `hides_noise` it does not say what was sent in ticks with noise, which the key makes again from the slots that
+    `played` is told. Raises MtmError when the file cannot be opened.
     """
 
     def __init__(
-        self, path: Path, header: JournalHeader, *, threaded: bool, max_bytes: int = DEFAULT_MAX_BYTES
+        self,
+        path: Path,
+        header: JournalHeader,
+        *,
+        threaded: bool,
+        max_bytes: int = DEFAULT_MAX_BYTES,
+        hides_noise: bool = False,
     ) -> None:
+        self.hides_noise = hides_noise
         # Two counts, since two threads count.
         self._overrun = self._unwritten = 0
         self._header = header
-        self._waiting: deque[_Row | Event] = deque()
+        self._waiting: deque[_Row | Event | PlayedSlot] = deque()
         self._recent: deque[Event] = deque(maxlen=_REPEATED_EVENTS)
+        self._slot: PlayedSlot | None = None
         self._segment_bytes = max_bytes // _SEGMENTS
         self._kept = self._size = 0
         self._torn = self._unsynced = False
@@ -86,6 +99,10 @@ class Journal:
         """Keep an event for writing, as `append` keeps a tick; may be called from any thread."""
         self._keep(Event(tick, text[:_LONGEST_EVENT]))
 
+    def played(self, slot: PlayedSlot) -> None:
+        """Keep for writing what is played from a tick on, as `append` keeps a tick."""
+        self._keep(slot)
+
     def close(self) -> None:
         """Write what waits and close the file; safe to call more than once."""
         if self._file.closed:
@@ -103,7 +120,7 @@ class Journal:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _keep(self, entry: _Row | Event) -> None:
+    def _keep(self, entry: _Row | Event | PlayedSlot) -> None:
         waiting = self._waiting
         if len(waiting) >= _MOST_WAITING:
             self._overrun += 1
@@ -122,16 +139,26 @@ class Journal:
         # In portions of a segment's size at most, however much has waited.
         while self._waiting:
             lines: list[bytes] = []
+            slot = self._slot
             while self._waiting and len(lines) < _INLINE_BATCH:
-                lines.append(self._line(self._waiting.popleft()))
+                entry = self._waiting.popleft()
+                lines.append(self._line(entry))
+                if isinstance(entry, PlayedSlot):
+                    slot = entry
+            # A segment that begins with these lines repeats the slot that is under way in the first of them.
             self._write(b"".join(lines))
+            self._slot = slot
 
-    def _line(self, entry: _Row | Event) -> bytes:
+    def _line(self, entry: _Row | Event | PlayedSlot) -> bytes:
+        if isinstance(entry, PlayedSlot):
+            return slot_line(entry)
         if isinstance(entry, Event):
             self._recent.append(entry)
             return event_line(entry)
         tick, now_s, base, sent, flags, late_s = entry
-        speeds = ",".join(f"{value:.9g}" for value in (*base, *sent))
+        speeds = ",".join(f"{value:.9g}" for value in base)
+        # With the fixed schedule's waveforms another body could play the message.
+        speeds += ",,," if self.hides_noise and flags & NOISE else "".join(f",{value:.9g}" for value in sent)
         return f"{tick},{now_s:.6f},{speeds},{late_s:.6f},{flags}\n".encode()
 
     def _write(self, text: bytes) -> None:
@@ -165,7 +192,7 @@ class Journal:
         except OSError:
             return False
         try:
-            fresh = self.path.open("xb", buffering=0)
+            fresh = _open_private(self.path)
         except OSError:
             with suppress(OSError):
                 os.replace(place, self.path)
@@ -173,7 +200,7 @@ class Journal:
         self._file.close()
         self._file, self._size, self._torn = fresh, 0, False
         self._kept += 1
-        self._write(heading(self._header, self._recent))
+        self._write(heading(self._header, self._recent) + (b"" if self._slot is None else slot_line(self._slot)))
         _sync_folder(self.path.parent)
         return True
 
@@ -186,13 +213,18 @@ class Journal:
                 os.fsync(self._file.fileno())
 
 
+def _open_private(path: Path) -> io.FileIO:
+    """A new file that its owner alone can read, whatever the umask: a journal tells what was said and when."""
+    return io.FileIO(path, "xb", opener=lambda name, flags: os.open(name, flags, 0o600))
+
+
 def _open_new(path: Path) -> tuple[Path, io.FileIO]:
     number = 1
     free = path
     while True:
         try:
             if not segments(free):
-                return free, free.open("xb", buffering=0)
+                return free, _open_private(free)
         except FileExistsError:
             pass  # it came between the look and the opening, or is no file at all
         except OSError as error:

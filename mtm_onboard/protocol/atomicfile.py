@@ -16,6 +16,15 @@ def replacing(path: Path, *, mode: int = 0o644) -> Iterator[Path]:
     An exception or an interrupt inside the block removes the temporary file and leaves whatever `path` held.
     Raises MtmError when the folder does not exist or cannot be written, or when `path` is a folder.
     """
+    with _temporary(path, mode) as temporary:
+        yield temporary
+        _confirm(temporary)
+        _take_place(temporary, path)
+
+
+@contextmanager
+def _temporary(path: Path, mode: int) -> Iterator[Path]:
+    """Yield an empty file beside `path`; an exception removes it."""
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
     except OSError as error:
@@ -25,12 +34,40 @@ def replacing(path: Path, *, mode: int = 0o644) -> Iterator[Path]:
     try:
         os.chmod(temporary, mode)
         yield temporary
-        with temporary.open("rb") as written:
-            os.fsync(written.fileno())
-        _take_place(temporary, path)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def write_new(path: Path, text: str, *, mode: int) -> None:
+    """Write a file that must not exist yet, whole or not at all; of several that write it at once one succeeds.
+
+    Raises MtmError when it exists, also as a link to nowhere, and as `replacing` does.
+    """
+    if os.path.lexists(path):
+        raise _exists(path)
+    with _temporary(path, mode) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+        _confirm(temporary)
+        try:
+            # Unlike a look and a renaming, a link is made only where no name is.
+            os.link(temporary, path)
+        except FileExistsError as error:
+            raise _exists(path) from error
+        except OSError as error:
+            raise MtmError(
+                f"cannot write {path}: {error.strerror}; choose a folder of a disk that has links"
+            ) from error
+        temporary.unlink()
+
+
+def _exists(path: Path) -> MtmError:
+    return MtmError(f"{path} exists already; choose another name or remove it first")
+
+
+def _confirm(path: Path) -> None:
+    with path.open("rb") as written:
+        os.fsync(written.fileno())
 
 
 def _take_place(temporary: Path, path: Path) -> None:

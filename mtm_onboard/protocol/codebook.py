@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.holding import Secret, holding_of
 from mtm_onboard.protocol.keystream import SECRET_BYTES
 from mtm_onboard.protocol.scheme import Channel, Scheme
 from mtm_onboard.protocol.slots import epoch_of_slot
@@ -13,21 +14,27 @@ from mtm_onboard.protocol.waveform import Complexes, Floats, draw_tones, evaluat
 
 
 class Codebook:
-    """Waveforms of one secret under one scheme.
+    """Waveforms of a secret, or of what a key file holds, under one scheme.
 
     A channel's windows count from the first one of message slot `first_slot`, see `slots`; under the fixed schedule
     every message has the same waveforms and the slot does not matter.
     """
 
-    def __init__(self, secret: bytes, scheme: Scheme, first_slot: int = 0) -> None:
-        if len(secret) != SECRET_BYTES:
+    def __init__(self, secret: Secret, scheme: Scheme, first_slot: int = 0) -> None:
+        if isinstance(secret, bytes) and len(secret) != SECRET_BYTES:
             raise MtmError(f"a secret has {SECRET_BYTES} bytes, not {len(secret)}; make one with mtm-onboard keygen")
-        self._secret = secret
+        self._holding = holding_of(secret)
         self.scheme = scheme
         self.first_slot = first_slot
 
     def __repr__(self) -> str:
         return f"Codebook(scheme={self.scheme.name!r}, first_slot={self.first_slot})"
+
+    @property
+    def last_slot(self) -> int | None:
+        """The last message slot that the key is for; None when there is no last one."""
+        grant = self._holding.grant
+        return None if grant is None else grant.last_slot(self.scheme)
 
     def bins(self, channel: Channel) -> NDArray[np.int64]:
         """In-band bins of the channel's window, shape (K,)."""
@@ -37,11 +44,13 @@ class Codebook:
         """Complex tones of the asked symbols (all M when None): shape (symbols, axes, K), see `waveform.phasors`.
 
         `window` counts this channel's windows from the first one of `first_slot`. Raises MtmError for a symbol
-        outside the alphabet and, under the rolling schedule, for a window before the Unix epoch.
+        outside the alphabet and, under the rolling schedule, for a window before the Unix epoch or of a day or channel
+        that the key is not for.
         """
         scheme = self.scheme
         asked = range(scheme.alphabet_size) if symbols is None else symbols
         epoch, played = self._place(channel, window)
+        secret = self._holding.channel_secret(epoch, scheme.channels.index(channel))
         first_axis = scheme.axis_index(channel)
         count = len(self.bins(channel))
         amplitudes = np.empty((len(asked), len(channel.axes), count))
@@ -51,7 +60,7 @@ class Codebook:
                 raise MtmError(f"symbol {symbol} is outside the alphabet; choose 0 to {scheme.alphabet_size - 1}")
             for axis in range(len(channel.axes)):
                 amplitudes[row, axis], phases_rad[row, axis] = draw_tones(
-                    self._secret, epoch, played, symbol, first_axis + axis, count
+                    secret, epoch, played, symbol, first_axis + axis, count
                 )
         return phasors(amplitudes, phases_rad, scheme.power)
 

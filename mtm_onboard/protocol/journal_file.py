@@ -8,6 +8,7 @@ with the run's latest events, so that it can be read alone.
 
 import glob
 import json
+import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -31,6 +32,7 @@ COLUMNS = (
     "tick", "time_s", "base_vx_mps", "base_vy_mps", "base_wz_radps", "sent_vx_mps", "sent_vy_mps", "sent_wz_radps",
     "lateness_s", "flags",
 )  # fmt: skip
+_SENT = slice(5, 8)
 _NUMBER_DIGITS = 6
 
 # What no run writes: beyond every clock, speed and tick, beyond the alphabets, and beyond the year 9999.
@@ -68,11 +70,24 @@ class Event:
     text: str
 
 
+@dataclass(frozen=True)
+class PlayedSlot:
+    """One time the message was played: from which tick on, in which slot, and the channel's own symbols.
+
+    `slot` is the message slot whose waveforms it has, counted since the Unix epoch under the rolling schedule.
+    """
+
+    first_tick: int
+    slot: int
+    symbols: tuple[int, ...]
+
+
 @dataclass(frozen=True, kw_only=True)
 class JournalRecord:
     """A journal read back: n rows. `base` and `sent` are (n, 3): vx, vy in m/s and wz in rad/s.
 
-    `flags` are the bits above; `damaged` counts lines that could not be read.
+    `flags` are the bits above; `damaged` counts lines that could not be read. `sent` is NaN where the journal does not
+    say it: in ticks with noise, which `journal_noise.with_noise` makes again with the key, from `slots`.
     """
 
     header: JournalHeader
@@ -84,10 +99,14 @@ class JournalRecord:
     flags: Integers
     damaged: int
     events: tuple[Event, ...] = ()
+    slots: tuple[PlayedSlot, ...] = ()
 
     @property
     def noise(self) -> Floats:
-        """What was added to the base command and reached the link, shape (n, 3); zero in ticks that were not sent."""
+        """What was added to the base command and reached the link, shape (n, 3).
+
+        Zero in ticks that were not sent, NaN where `sent` is.
+        """
         reached = (self.flags & UNSENT) == 0
         noise: Floats = np.where(reached[:, None], self.sent - self.base, 0.0)
         return noise
@@ -102,6 +121,11 @@ def heading(header: JournalHeader, events: Iterable[Event] = ()) -> bytes:
 def event_line(event: Event) -> bytes:
     """One event as a line."""
     return f"# {json.dumps(asdict(event))}\n".encode()
+
+
+def slot_line(slot: PlayedSlot) -> bytes:
+    """A slot that was played as a line."""
+    return f"# {json.dumps(asdict(slot))}\n".encode()
 
 
 def segments(path: Path) -> list[Path]:
@@ -127,6 +151,7 @@ def read_journal(path: Path) -> JournalRecord:
     header: JournalHeader | None = None
     tables: list[Floats] = []
     events: dict[Event, None] = {}
+    slots: dict[PlayedSlot, None] = {}
     damaged = 0
     for segment in segments(path) or [path]:
         with opened(segment, "the journal") as file:
@@ -134,6 +159,7 @@ def read_journal(path: Path) -> JournalRecord:
         header = content.header or header
         tables.append(content.rows)
         events.update(dict.fromkeys(content.events))
+        slots.update(dict.fromkeys(content.slots))
         damaged += content.damaged
     if header is None:
         raise MtmError(f"{path} does not begin like a journal; name a file that mtm-onboard run wrote")
@@ -153,6 +179,7 @@ def read_journal(path: Path) -> JournalRecord:
         flags=columns[:, 9].astype(np.int64),
         damaged=damaged,
         events=tuple(events),
+        slots=tuple(slots),
     )
 
 
@@ -163,19 +190,22 @@ class _Content:
     header: JournalHeader | None
     rows: Floats
     events: list[Event]
+    slots: list[PlayedSlot]
     damaged: int
 
 
 def _content(lines: list[str]) -> _Content:
-    header, rows, events, damaged = None, [], [], int(bool(lines[-1]))
+    header, rows, events, slots, damaged = None, [], [], [], int(bool(lines[-1]))
     names = ",".join(COLUMNS)
     for line in lines[:-1]:
         if line.startswith("#"):
             table = _table(line)
-            event, begun = _event(table), _header(table)
+            event, begun, slot = _event(table), _header(table), _slot(table)
             if event is not None:
                 events.append(event)
-            damaged += event is None and begun is None
+            if slot is not None:
+                slots.append(slot)
+            damaged += event is None and begun is None and slot is None
             header = begun or header
         elif (row := _numbers(line)) is not None:
             rows.append(row)
@@ -183,10 +213,15 @@ def _content(lines: list[str]) -> _Content:
             damaged += 1
     columns = np.array(rows, dtype=np.float64).reshape(-1, len(COLUMNS))
     ticks, flags = columns[:, 0], columns[:, -1]
-    # NaN is in no range.
-    sound = np.all(np.abs(columns) <= _LARGEST_NUMBER, axis=1) & (np.floor(ticks) == ticks)
+    # NaN is in no range; a tick with noise may leave out what was sent.
+    sent = columns[:, _SENT]
+    in_range = np.abs(columns) <= _LARGEST_NUMBER
+    noisy = np.mod(np.where(in_range[:, -1], flags, 0.0), 2 * NOISE) >= NOISE
+    left_out = np.all(np.isnan(sent), axis=1) & noisy
+    in_range[:, _SENT] |= left_out[:, None]
+    sound = np.all(in_range, axis=1) & (np.floor(ticks) == ticks)
     sound &= (flags >= 0) & (flags < 2 * UNSENT) & (np.floor(flags) == flags)
-    return _Content(header, columns[sound], events, damaged + int(np.count_nonzero(~sound)))
+    return _Content(header, columns[sound], events, slots, damaged + int(np.count_nonzero(~sound)))
 
 
 def _header(table: dict[str, Any]) -> JournalHeader | None:
@@ -209,6 +244,17 @@ def _event(table: dict[str, Any]) -> Event | None:
     tick, text = table.get("tick"), table.get("text")
     largest = int(_LARGEST_NUMBER)
     return Event(tick, text) if _is_whole(tick, -largest, largest) and _is_text(text) else None
+
+
+def _slot(table: dict[str, Any]) -> PlayedSlot | None:
+    if table.keys() != {"first_tick", "slot", "symbols"}:
+        return None
+    first_tick, slot, symbols = table["first_tick"], table["slot"], table["symbols"]
+    largest = int(_LARGEST_NUMBER)
+    fits = _is_whole(first_tick, -largest, largest) and _is_whole(slot, 0, largest) and isinstance(symbols, list)
+    if not fits or not all(_is_whole(symbol, 0, _LARGEST_SYMBOL) for symbol in symbols):
+        return None
+    return PlayedSlot(first_tick, slot, tuple(symbols))
 
 
 def _is_whole(value: Any, low: int, high: int) -> TypeGuard[int]:
@@ -235,7 +281,7 @@ def _table(line: str) -> dict[str, Any]:
 
 def _numbers(line: str) -> list[float] | None:
     try:
-        numbers = list(map(float, line.split(",")))
+        numbers = [float(field) if field else math.nan for field in line.split(",")]
     except ValueError:
         return None
     return numbers if len(numbers) == len(COLUMNS) else None

@@ -78,14 +78,22 @@ class Scheme:
         raise MtmError(f"the scheme has no channel {name!r}; choose one of: {known}")
 
     def axis_index(self, channel: Channel) -> int:
-        """Number of the channel's first axis, counted over all channels in order (the waveform's `c`)."""
-        return sum(len(other.axes) for other in self.channels[: self.channels.index(channel)])
+        """Number of the channel's first axis, counted over all channels in order (the waveform's `c`).
+
+        A channel with some of the axes only, in their order and next to each other, counts from the first of these.
+        """
+        place = self._place(channel)
+        before = sum(len(other.axes) for other in self.channels[:place])
+        return before + self.channels[place].axes.index(channel.axes[0])
 
     def first_position(self, channel: Channel) -> int:
         """Position in the message of the first symbol of the channel; 0 when all channels carry the same."""
         if self.combine == "same":
             return 0
-        return sum(other.symbols for other in self.channels[: self.channels.index(channel)])
+        return sum(other.symbols for other in self.channels[: self._place(channel)])
+
+    def _place(self, channel: Channel) -> int:
+        return [other.name for other in self.channels].index(channel.name)
 
     @property
     def message_symbols(self) -> int:

@@ -48,6 +48,11 @@ def epoch_of_slot(slot: int, scheme: Scheme) -> tuple[int, int]:
     return scheme.epoch + day, slot - math.ceil(day * EPOCH_S / slot_s)
 
 
+def last_slot_of_epoch(epoch: int, scheme: Scheme) -> int:
+    """The last slot that starts in the epoch."""
+    return math.ceil((epoch - scheme.epoch + 1) * EPOCH_S / _slot_s(scheme)) - 1
+
+
 def _slot_s(scheme: Scheme) -> Fraction:
     # As the rate is written: 49.95 Hz means 49.95 and not the binary number next to it, whose days drift.
     return scheme.message_ticks / Fraction(str(scheme.rate_hz))

@@ -18,7 +18,9 @@ DEFAULTS: dict[str, str | int | float] = {
     "noise_off_s": 0.1,
     "stopped_s": 0.25,
     "journal": "",
+    "state": "",
     "socket": "",
+    "allow_unsynchronised": False,
 }
 
 
@@ -40,7 +42,7 @@ def config_of(values: dict[str, Any], name: str) -> RobotConfig:
         "limits": {field: values[field] for field in ("speed_mps", "turn_rate_radps")},
         "stale": {field: values[field] for field in ("noise_off_s", "stopped_s")},
     }
-    for section, field in (("journal", "path"), ("control", "socket")):
+    for section, field in (("journal", "path"), ("state", "path"), ("control", "socket")):
         value = values["socket" if section == "control" else section]
         if value != "":
             table[section] = {field: value}
@@ -55,6 +57,9 @@ def plan_of(values: dict[str, Any]) -> Plan:
     number, text = values["message"], values["text"]
     if type(number) is not int or not isinstance(text, str):
         raise MtmError("the message must be a whole number and the text a text in quotes; correct the parameter")
+    if type(values["allow_unsynchronised"]) is not bool:
+        raise MtmError("allow_unsynchronised must be true or false; correct the parameter")
     if number >= 0 and text:
         raise MtmError("both a message and a text are given; give one of the two")
-    return Plan(text or (number if number >= 0 else None))
+    content = text or (number if number >= 0 else None)
+    return Plan(content, allow_unsynchronised=values["allow_unsynchronised"])

@@ -11,8 +11,8 @@ from mtm_onboard.protocol.input_file import BrokenTextError, parsed_toml, read_t
 from mtm_onboard.runtime.guard import Limits, Staleness
 
 Option = str | int | float | bool
-_SECTIONS = ("robot", "transport", "link", "limits", "stale", "source", "journal", "control", "realtime")
-_OPTIONAL_SECTIONS = ("link", "stale", "journal", "control", "realtime")
+_SECTIONS = ("robot", "transport", "link", "limits", "stale", "source", "journal", "state", "control", "realtime")
+_OPTIONAL_SECTIONS = ("link", "stale", "journal", "state", "control", "realtime")
 _SOURCE_KINDS = ("unix", "udp", "stdin")
 _T = TypeVar("_T")
 
@@ -77,6 +77,13 @@ class JournalSettings:
 
 
 @dataclass(frozen=True)
+class StateSettings:
+    """The path of the ledger, which keeps from run to run which slots were played and how messages are numbered."""
+
+    path: str
+
+
+@dataclass(frozen=True)
 class ControlSettings:
     """The path of the control socket, which takes another message or the operator's stop while the robot runs."""
 
@@ -105,7 +112,7 @@ class RealtimeSettings:
 class RobotConfig:
     """All of it. `transport_options` are the fields of [transport] beside its kind.
 
-    `journal` and `control` may be absent.
+    `journal`, `state` and `control` may be absent.
     """
 
     robot: Robot
@@ -118,6 +125,14 @@ class RobotConfig:
     link: LinkSettings = LinkSettings()
     control: ControlSettings | None = None
     realtime: RealtimeSettings = RealtimeSettings()
+    state: StateSettings | None = None
+
+    @property
+    def ledger_path(self) -> Path | None:
+        """Where the ledger lies: as [state] says, else beside the journal; None without both."""
+        if self.state is not None:
+            return Path(self.state.path)
+        return None if self.journal is None else Path(f"{self.journal.path}.state")
 
 
 def load_config(path: Path) -> RobotConfig:
@@ -154,6 +169,7 @@ def config_from_table(table: dict[str, Any]) -> RobotConfig:
         control=_section(ControlSettings, "control", table["control"]) if "control" in table else None,
         link=_section(LinkSettings, "link", table.get("link", {})),
         realtime=_section(RealtimeSettings, "realtime", table.get("realtime", {})),
+        state=_section(StateSettings, "state", table["state"]) if "state" in table else None,
     )
 
 

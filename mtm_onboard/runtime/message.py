@@ -4,8 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
+
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.protocol.framing import Payload, check_symbols, encode_frame, frame_order, symbols_of_number
+from mtm_onboard.protocol.framing.slot_mask import slot_mask
 from mtm_onboard.protocol.slots import epoch_of_slot
 
 # What an operator may ask a robot to send; a tuple is the whole message's symbols, of a scheme without framing.
@@ -69,7 +72,9 @@ class FramedMessage:
         self.payload = payload
         self.number = number
         self._key = key
-        self._encoded = self._encode(key.scheme.epoch)
+        # What does not fit is found here, by a tag of whatever epoch the key is for.
+        grant, scheme = key.holding.grant, key.scheme
+        self._encoded = self._encode(scheme.epoch if grant is None else grant.epochs(scheme)[0])
 
     @property
     def words(self) -> str:
@@ -83,11 +88,15 @@ class FramedMessage:
         encoded_for, frame = self._encoded
         if epoch != encoded_for:
             self._encoded = _, frame = self._encode(epoch)
+        mask = slot_mask(scheme, self._key.holding, slot)
+        if mask is not None:
+            frame = tuple((np.array(frame) ^ mask).tolist())
         return tuple(frame[place] for place in frame_order(scheme, slot).tolist())
 
     def _encode(self, epoch: int) -> tuple[int, tuple[int, ...]]:
         key = self._key
-        return epoch, encode_frame(self.payload, key.scheme, key.secret, number=self.number, epoch=epoch)
+        secret = key.holding.tag_key(epoch)
+        return epoch, encode_frame(self.payload, key.scheme, secret, number=self.number, epoch=epoch)
 
 
 def message_of(content: Content, key: Key, number: int = 0) -> Message:

@@ -73,7 +73,7 @@ class Modulator:
     def __init__(self, codebook: Codebook, channel_name: str, message: Played, *, repeat: bool = True) -> None:
         scheme = codebook.scheme
         self.channel = channel = scheme.channel(channel_name)
-        self._message_ticks = scheme.message_ticks
+        self.message_ticks = scheme.message_ticks
         self._codebook = codebook
         self._window_ticks = scheme.window_ticks(channel)
         self._rolling = scheme.schedule == "rolling"
@@ -129,6 +129,13 @@ class Modulator:
         part = self._part_at(tick)
         return part.start_tick <= tick < part.end_tick
 
+    def slot_played(self, tick: int) -> tuple[int, tuple[int, ...]] | None:
+        """The message slot of this tick and this channel's own symbols in it; None where there is no noise."""
+        if not self.sends(tick):
+            return None
+        slot = self._codebook.first_slot + tick // self.message_ticks
+        return slot, tuple(self._own_symbols(self._part_at(tick).message, slot))
+
     def perturbation(self, tick: int) -> Floats:
         """Unit-variance noise of this tick, a read-only view of shape (axes,); zeros outside the message."""
         part = self._part_at(tick)
@@ -171,7 +178,7 @@ class Modulator:
                 self._compute(following)
 
     def _take_up(self, tick: int) -> None:
-        start_tick = self._boundary(tick) * self._message_ticks
+        start_tick = self._boundary(tick) * self.message_ticks
         try:
             while True:
                 queued = self._queue.popleft()
@@ -184,7 +191,7 @@ class Modulator:
 
     def _boundary(self, tick: int) -> int:
         """Number of the message that begins next after `tick`."""
-        return max(0, tick // self._message_ticks + 1)
+        return max(0, tick // self.message_ticks + 1)
 
     def _queued(self, message: Played, breath_s: float = 0.0) -> Queued:
         """`message` with its noise, computed here under the fixed schedule; checks it under both."""
@@ -217,7 +224,11 @@ class Modulator:
     def _end_tick(self, start_tick: int, message: Played) -> float:
         if isinstance(message, Silence):
             return start_tick
-        return np.inf if self._repeat else start_tick + self._message_ticks
+        end_tick = np.inf if self._repeat else start_tick + self.message_ticks
+        # Beyond the last slot that the key is for there is nothing to play.
+        last = self._codebook.last_slot
+        held = np.inf if last is None else (last - self._codebook.first_slot + 1) * self.message_ticks
+        return max(float(start_tick), min(end_tick, held))
 
     def _part_at(self, tick: int) -> _Part:
         following = self._next
@@ -233,7 +244,7 @@ class Modulator:
 
     def _compute(self, window: int) -> None:
         later, place = divmod(window, self.channel.symbols)
-        part = self._part_at(later * self._message_ticks)
+        part = self._part_at(later * self.message_ticks)
         if (part, later) != self._known[:2]:
             self._known = (part, later, self._own_symbols(part.message, self._codebook.first_slot + later))
         held = window % _KEPT_WINDOWS

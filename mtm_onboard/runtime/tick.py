@@ -8,7 +8,9 @@ from mtm_onboard.links.base import Link
 from mtm_onboard.links.reconnecting import ReconnectingLink
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.journal_file import PlayedSlot
 from mtm_onboard.runtime.guard import Guard
+from mtm_onboard.runtime.modulator import Modulator
 from mtm_onboard.runtime.source import Source
 
 
@@ -45,6 +47,8 @@ class Runtime:
         if modulator is not None:
             modulator.require_body_axes()
         self.link_losses = self.link_degradations = 0
+        # From this tick on there is no noise, whatever the modulator would play.
+        self.noise_until_tick: float = math.inf
         self._up_since_s: float | None = -math.inf
         self._after_s = -math.inf
         self._degraded = ""
@@ -53,10 +57,16 @@ class Runtime:
         self._dropped = 0 if self._outages is None else self._outages.dropped
         self._stop_noted = False
         self._modulator = modulator
+        self._first_tick = 0
+        self._next_slot_tick = -math.inf
         self._guard = guard
         self._source = source
         self._link = link
         self._journal = journal
+
+    def play(self, modulator: NoiseAdder, first_tick: int) -> None:
+        """Have another modulator's tick 0 at `first_tick`, from the next step on; from the loop's thread."""
+        self._modulator, self._first_tick, self._next_slot_tick = modulator, first_tick, first_tick
 
     def step(self, tick: int, now_s: float, late_s: float = 0.0) -> bool:
         """Whether one command left: newest base, guard, noise, limits, send; journal and next window come after.
@@ -77,7 +87,11 @@ class Runtime:
         if link.degraded != self._degraded:
             self._follow_doubts(tick, link.degraded)
         base = guard.admit(velocity, arrived_s, now_s, after_s=self._after_s)
-        wanted = base if modulator is None or not guard.noise_allowed else modulator.add(tick, base)
+        own_tick = tick - self._first_tick
+        if modulator is None or not guard.noise_allowed or tick >= self.noise_until_tick:
+            wanted = base
+        else:
+            wanted = modulator.add(own_tick, base)
         sent = guard.limit(base, wanted)
         try:
             link.send(sent)
@@ -92,12 +106,27 @@ class Runtime:
             guard.not_sent()
         self._record(tick, now_s, late_s, base, sent)
         if modulator is not None:
-            modulator.prepare(tick)
+            modulator.prepare(own_tick)
+        if tick >= self._next_slot_tick:
+            self._follow_slots(tick)
         return has_left
 
     def _record(self, tick: int, now_s: float, late_s: float, base: BodyVelocity, sent: BodyVelocity) -> None:
         if self._journal is not None:
             self._journal.append(tick, now_s, base, sent, self._guard.flags, late_s)
+
+    def _follow_slots(self, tick: int) -> None:
+        """The journal is told once a slot what is played, where it does not say it tick by tick."""
+        journal, modulator = self._journal, self._modulator
+        if journal is None or not journal.hides_noise or not isinstance(modulator, Modulator):
+            self._next_slot_tick = math.inf
+            return
+        ticks = modulator.message_ticks
+        begun = self._first_tick + (tick - self._first_tick) // ticks * ticks
+        self._next_slot_tick = begun + ticks
+        played = modulator.slot_played(tick - self._first_tick)
+        if played is not None:
+            journal.played(PlayedSlot(begun, *played))
 
     def _follow_doubts(self, tick: int, doubt: str) -> None:
         """The link has begun or ceased to doubt that the robot obeys, or does so for another reason."""

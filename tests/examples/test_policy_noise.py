@@ -9,7 +9,7 @@ import pytest
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.track import Track
-from mtm_audit.readers.motion_capture import read_csv
+from mtm_audit.readers.logs.registry import read_log
 from mtm_onboard.protocol import Key, load_key
 
 SCRIPT = Path(__file__).parents[2] / "examples" / "policy_noise.py"
@@ -52,7 +52,7 @@ def test_the_script_leaves_a_recording_and_its_key(example, tmp_path, capsys, mo
     monkeypatch.setattr(example, "generate_key", lambda key_id, scheme: Key(key_id, FAKE_SECRET, scheme))
     out = tmp_path / "policy"
     assert example.main(["--message", "178", "--out", str(out)]) == 0
-    decoded = decode_tracks([read_csv(out / "point.csv")], load_key(out / "point.key"), KNOWN)
+    decoded = decode_tracks(read_log(out / "point.csv").tracks, load_key(out / "point.key"), KNOWN)
     assert decoded.message == 178
     assert f"mtm-audit decode {out / 'point.csv'} --key {out / 'point.key'} --onset 0" in capsys.readouterr().out
 

@@ -19,6 +19,7 @@ from tests.firmware.shim_model import (
 from tests.firmware.shim_player import ShimPlayer
 
 VECTORS = json.loads((Path(__file__).parents[1] / "onboard/protocol/waveform_v1.json").read_text())
+KEY_TREE = json.loads((Path(__file__).parents[1] / "onboard/protocol/key_tree_v2.json").read_text())
 SECRET = b"not a real secret, only for test"
 WIDE = in_q20(WIDE_LIMITS)
 
@@ -95,6 +96,29 @@ def test_the_reference_waveforms_are_played_to_the_stated_bound(vector):
     bound_q20 = image.steps[axis] / (1 << 17) + 0.5
     assert np.max(np.abs(np.array(played) - expected)) <= bound_q20 + 1e-6
     assert bound_q20 / ONE / sigma < 1e-4
+
+
+def test_a_channel_of_the_key_tree_is_played_to_the_stated_bound():
+    vector = KEY_TREE["waveform"]
+    secret = bytes.fromhex(KEY_TREE["days"][2]["channels"][1])
+    scheme = Scheme(
+        name="reference",
+        rate_hz=float(vector["rate_hz"]),
+        band_hz=tuple(map(float, vector["band_hz"])),
+        alphabet_size=4,
+        message_ticks=vector["ticks"],
+        channels=(Channel("robot", "robot", ("vx", "vy", "wz"), 1, 0.1),),
+        schedule="rolling",
+        epoch=vector["day"],
+    )
+    image = channel_image(
+        Codebook(secret, scheme), "robot", (vector["symbol"],), limits=WIDE_LIMITS, first_message=vector["window"]
+    )
+    player = ShimPlayer(image.rate_mhz, WIDE, 9_999, 10_000)
+    assert player.offer(image) == 0
+    played = [player.tick(tick * 20_000, (0, 0, 0))[vector["axis"]] for tick in range(vector["ticks"])]
+    expected = 0.1 * np.array(vector["samples"], float) * ONE
+    assert np.max(np.abs(np.array(played) - expected)) <= image.steps[2] / (1 << 17) + 0.5 + 1e-6
 
 
 @pytest.mark.parametrize("seed", range(20))

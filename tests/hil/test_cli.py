@@ -6,6 +6,7 @@ import sys
 import time
 from datetime import UTC, datetime
 
+import numpy as np
 import pytest
 
 from hil.cli import CameraName, main
@@ -14,7 +15,8 @@ from hil.experiments.detectors.paper_figures import MARGINS
 from hil.fleet.lockstep import run_lockstep
 from hil.fleet.programs import program
 from hil.sensors.cameras import CAMERAS
-from mtm_audit.readers.motion_capture import read_tum
+from hil.worlds.vehicles import VEHICLES
+from mtm_audit.readers.logs.registry import read_log
 from mtm_audit.readers.video import read_frames
 from mtm_onboard.cli import main as onboard
 from mtm_onboard.protocol import load_key
@@ -39,8 +41,32 @@ def test_a_recording_has_motion_capture_the_truth_and_the_key(tmp_path, capsys):
     key = load_key(tmp_path / "a" / "robot.key")
     assert truth["scheme_fingerprint"] == key.scheme.fingerprint
     assert key.secret.hex() not in (tmp_path / "a" / "truth.json").read_text()
-    assert len(read_tum(tmp_path / "a" / "mocap" / "robot3.tum").times_s) == 201
+    assert len(read_log(tmp_path / "a" / "mocap" / "robot3.tum").tracks[0].times_s) == 201
     assert sorted(path.name for path in (tmp_path / "a").iterdir()) == ["mocap", "robot.key", "truth.json"]
+
+
+@pytest.mark.parametrize("plant", [name for name in VEHICLES if name != "arm"])
+def test_any_kind_of_robot_that_drives_can_be_recorded(plant, tmp_path, capsys):
+    seconds = ["record", "--seconds", "4", "--wire", "direct", "--plant", plant, "--no-video"]
+    assert run(*seconds, "--message", 178, "--out", tmp_path / "a") == 0
+    key = load_key(tmp_path / "a" / "robot.key")
+    assert key.scheme.channels[0].axes == VEHICLES[plant].kind.axes
+    track = read_log(tmp_path / "a" / "mocap" / "robot0.tum").tracks[0]
+    assert np.ptp(track.positions, axis=0).max() > 0.3
+    assert (np.ptp(np.unwrap(track.headings_rad)) > 1.0) == (plant in {"spinning", "diff-drive"})
+
+
+def test_an_arm_does_not_drive_through_the_arena(tmp_path, capfd):
+    assert run(*QUICK, "--no-message", "--plant", "arm", "--no-video", "--out", tmp_path / "a") == 1
+    assert "the plant 'arm' does not drive through the fleet's arena; choose from: robomaster" in capfd.readouterr().err
+    assert not (tmp_path / "a").exists()
+
+
+def test_a_key_on_other_axes_than_the_robots_is_mentioned(tmp_path, capsys):
+    run(*QUICK, "--message", 1, "--no-video", "--out", tmp_path / "a")
+    given = ["--message", 1, "--no-video", "--key", tmp_path / "a" / "robot.key", "--plant", "diff-drive"]
+    assert run(*QUICK, *given, "--out", tmp_path / "b") == 0
+    assert "the key's noise is on vx, vy; diff-drive carries it on vx, wz" in capsys.readouterr().out
 
 
 def test_a_rolling_recording_says_when_it_was_made(tmp_path, capsys):

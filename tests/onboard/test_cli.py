@@ -15,6 +15,7 @@ from mtm_onboard.journal.journal import read_journal
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import load_key
 from mtm_onboard.protocol.framing import symbols_of_number
+from mtm_onboard.protocol.journal_noise import with_noise
 from mtm_onboard.runtime.client import BaseCommandClient
 from mtm_onboard.runtime.guard import NOISE
 from mtm_onboard.runtime.modulator import Modulator
@@ -35,6 +36,8 @@ socket = "{source}"
 path = "{journal}"
 """
 TOLD = """\
+mtm-onboard: key fake-key is of format 1: whoever has it can read and forge the messages of all robots and days; \
+mtm-onboard keygen and issue make keys of format 2
 mtm-onboard: robot0 plays channel robot1 of scheme robomaster-fleet (0123) with key fake-key: silence
 mtm-onboard: base commands come from the socket HERE/r.base and go to none
 mtm-onboard: to stop the robot: the datagram stop to the socket HERE/r.base; Ctrl-C ends the run
@@ -213,7 +216,7 @@ def test_lines_on_standard_input_become_motion(tmp_path, key):
     assert out.count(b"\n") == 1
     assert all(line.startswith(b"mtm-onboard: ") for line in error.splitlines())
     assert noisy_ticks(tmp_path) > 0
-    record = read_journal(tmp_path / "journal.csv")
+    record = with_noise(read_journal(tmp_path / "journal.csv"), load_key(key))
     noisy = record.flags == NOISE
     own = Modulator(load_key(key).codebook(), "robot1", (1,))
     base = BodyVelocity(0.2, 0.0, 0.1)

@@ -17,6 +17,7 @@ import pytest
 
 from mtm_onboard.journal.journal import read_journal
 from mtm_onboard.protocol import load_key
+from mtm_onboard.protocol.journal_noise import with_noise
 from mtm_onboard.runtime.guard import NOISE
 from mtm_onboard.runtime.message import message_of
 from mtm_onboard.runtime.modulator import Modulator
@@ -150,7 +151,8 @@ def drive(run: subprocess.Popen[str], seconds: float) -> None:
 
 def check_journal(robot: Path) -> None:
     """What Debian's numpy made of the key is what the one here makes of it."""
-    key, record = load_key(robot / HOME / "robot0.key"), read_journal(robot / HOME / "robot0.journal")
+    key = load_key(robot / HOME / "robot0.key")
+    record = with_noise(read_journal(robot / HOME / "robot0.journal"), key)
     (event,) = [event for event in record.events if "message 1 begins" in event.text]
     first, second = (
         Modulator(key.codebook(), "robot0", message_of(number, key, place))

@@ -64,6 +64,21 @@ def test_the_service_exposes_little():
     assert float(exposure.group(1)) < 3.0
 
 
+def test_no_dump_of_the_service_holds_the_key():
+    assert "LimitCORE=0" in UNIT.read_text().splitlines()
+
+
+def test_the_service_may_ask_for_the_time_and_waits_for_it():
+    lines = UNIT.read_text().splitlines()
+    assert {"adjtimex", "clock_adjtime"} <= allowed_calls()
+    # It would deny both.
+    assert not any(line.startswith("ProtectClock=") for line in lines)
+    assert "CapabilityBoundingSet=" in lines
+    wanted = {name for line in lines if line.startswith("Wants=") for name in line.partition("=")[2].split()}
+    assert wanted == {"time-sync.target", "chrony-wait.service", "systemd-time-wait-sync.service"}
+    assert any(line.startswith("After=") and "time-sync.target" in line for line in lines)
+
+
 def calls_of(group: str) -> set[str]:
     """The system calls of one of systemd's groups and of those within it."""
     said = subprocess.run(
@@ -80,7 +95,10 @@ def allowed_calls() -> set[str]:
     for line in UNIT.read_text().splitlines():
         if line.startswith("SystemCallFilter="):
             group = line.partition("=")[2]
-            allowed = allowed - calls_of(group[1:]) if group.startswith("~") else allowed | calls_of(group)
+            if group.startswith("~"):
+                allowed -= calls_of(group[1:])
+            else:
+                allowed |= calls_of(group) if group.startswith("@") else set(group.split())
     return allowed
 
 

@@ -18,8 +18,15 @@ ROOT = Path(__file__).parents[2]
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
 PROGRAMS = {"mtm-onboard": "mtm_onboard", "mtm-audit": "mtm_audit", "mtm-hil": "hil"}
 # What each extra brings that can be imported; those that are not here are what a program needs.
-LIBRARIES = {"can": ["can"], "serial": ["serial"], "mavlink": ["pymavlink"], "worlds": ["vmas", "mujoco", "Box2D"]}
-COMPLETE = ("audit", "hil", "worlds")
+LIBRARIES = {
+    "can": ["can"],
+    "serial": ["serial"],
+    "mavlink": ["pymavlink"],
+    "logs": ["ezc3d", "mcap", "mcap_protobuf", "pymavlink", "pyulog", "rosbags"],
+    "parquet": ["pyarrow"],
+    "worlds": ["vmas", "mujoco", "Box2D"],
+}
+COMPLETE = ("audit", "logs", "parquet", "hil", "worlds")
 
 pytestmark = pytest.mark.long
 

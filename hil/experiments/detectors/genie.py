@@ -37,7 +37,7 @@ class Interference:
 def fit_interference(silences: Sequence[Motion]) -> Interference:
     """The interference's statistics, fitted to many motions without a message."""
     noise = fit_noise([motion.velocities for motion in silences], [motion.seen for motion in silences], ORDER)
-    return Interference(noise.filter, np.sqrt(np.mean(np.square(noise.scales), axis=0)))
+    return Interference(noise.filters[0][0], np.sqrt(np.mean(np.square(noise.scales), axis=0)))
 
 
 def tick_responses(plant: MecanumParameters, onset_s: float, rate_hz: float, ticks: int, motion: Motion) -> Floats:

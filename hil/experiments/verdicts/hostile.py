@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.experiments.verdicts.sent import STEP_S, Sending, sent_track
-from hil.experiments.verdicts.vehicles import CALIBRATED, VEHICLES
-from hil.plants.velocity_responses import Floats, lagged
+from hil.fleet.driven import sent_track
+from hil.fleet.sending import STEP_S, Sending
+from hil.plants.family import ROBOMASTER
+from hil.plants.responses import Floats, lag
+from hil.worlds.vehicles import VEHICLES
 from mtm_audit.model.track import FARTHEST, Track
 from mtm_onboard.protocol import Channel, Codebook, Scheme
 from mtm_onboard.protocol.scheme import Power
@@ -120,7 +122,7 @@ def _crowd(scheme: Scheme, draw: np.random.Generator) -> list[Track]:
         symbols = tuple(int(symbol) for symbol in draw.integers(0, _ALPHABET, channel.symbols))
         sending = _sending(draw.bytes(32), scheme, channel, symbols, onset_s=float(draw.uniform(-4.0, 0.0)))
         total += sending.noise(times_s)
-    return [_track(times_s, np.cumsum(lagged(total, STEP_S, 0.1), axis=0) * STEP_S)]
+    return [_track(times_s, np.cumsum(lag(STEP_S, 0.1).advance(total), axis=0) * STEP_S)]
 
 
 def _another_key(scheme: Scheme, draw: np.random.Generator) -> list[Track]:
@@ -131,7 +133,7 @@ def _another_key(scheme: Scheme, draw: np.random.Generator) -> list[Track]:
         symbols = tuple(int(symbol) for symbol in draw.integers(0, _ALPHABET, channel.symbols))
         sending = _sending(secret, scheme, channel, symbols, onset_s=0.5)
         seconds = 5.2 if len(scheme.channels) > 1 else float(draw.uniform(5.2, 7.0))
-        tracks.append(sent_track(channel.body, VEHICLES[CALIBRATED], [sending], seconds, draw))
+        tracks.append(sent_track(channel.body, VEHICLES[ROBOMASTER], [sending], seconds, draw))
     return tracks
 
 

@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.experiments.runs.cells import Cell, Scalar, Values
-from hil.experiments.verdicts.sent import Sending, sent_track
 from hil.experiments.verdicts.thresholds import THRESHOLDS, decode_at
-from hil.experiments.verdicts.vehicles import VEHICLES, Vehicle
+from hil.fleet.driven import sent_track
+from hil.fleet.sending import Sending
+from hil.worlds.vehicles import VEHICLES, Vehicle
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.track import Track
 from mtm_onboard.protocol import Channel, Key, MtmError, Scheme
@@ -116,7 +117,7 @@ def _summary(plant: str, results: Sequence[Values], threshold: float) -> SureSum
 def _single(vehicle: Vehicle, draw: np.random.Generator) -> tuple[Key, _Job, list[Track], tuple[int | None, ...]]:
     """One vehicle that sends a message of one to four symbols."""
     windows, ticks = int(draw.choice((1, 2, 4))), int(draw.choice((100, 200, 300)))
-    scheme = _scheme((Channel("robot", "robot", vehicle.axes, windows, _SIGMA),), windows * ticks, draw)
+    scheme = _scheme((Channel("robot", "robot", vehicle.kind.axes, windows, _SIGMA),), windows * ticks, draw)
     job = _job(scheme, draw)
     key = Key("sent", draw.bytes(32), scheme)
     symbols = _symbols(scheme, windows, draw)
@@ -133,7 +134,7 @@ def _fleet(draw: np.random.Generator) -> tuple[Key, _Job, list[Track], tuple[int
     symbols = _symbols(scheme, _ROBOTS, draw)
     fault, one = str(draw.choice(FAULTS)), int(draw.integers(_ROBOTS))
     other = (one + 1) % _ROBOTS
-    usual = [vehicle for vehicle in VEHICLES.values() if vehicle.axes == ("vx", "vy")]
+    usual = [vehicle for vehicle in VEHICLES.values() if vehicle.kind.axes == ("vx", "vy")]
     vehicle = usual[int(draw.integers(len(usual)))]
     plays = [[(name, (symbols[row],))] for row, name in enumerate(names)]
     sent: list[int | None] = list(symbols)

@@ -12,6 +12,7 @@ from mtm_onboard.protocol import MtmError, Scheme
 from mtm_onboard.protocol.framing import Frame, Framing, Payload
 from mtm_onboard.protocol.framing.frame import frame_of_data
 from mtm_onboard.protocol.framing.framing import CheckKind, Layout, layout_of
+from mtm_onboard.protocol.tag_key import TagKey
 
 # Codewords written out and ranked for one frame. Where 1024 read two frames in five, 4096 read one in twenty to one in
 # seven more of them, and take three times as long.
@@ -62,7 +63,7 @@ class Message:
         return 1.0 if self.check == "none" else min(1.0, self.tried * 2.0**-self.check_bits)
 
 
-def decode_message(ratios: Floats, scheme: Scheme, secret: bytes, epochs: Sequence[int]) -> Message:
+def decode_message(ratios: Floats, scheme: Scheme, secret: bytes | TagKey, epochs: Sequence[int]) -> Message:
     """Decode one frame from log-likelihood ratios (L, M) in nats, in frame order.
 
     ratios[p, i] compares "symbol i at p" with anything that is the same for all i; a row of zeros was not seen. Several
@@ -107,7 +108,7 @@ class _Found:
     tried: int
 
 
-def _first_frame(candidates: Codewords, framing: Framing, secret: bytes, epochs: Sequence[int]) -> _Found:
+def _first_frame(candidates: Codewords, framing: Framing, secret: bytes | TagKey, epochs: Sequence[int]) -> _Found:
     log_likelihoods = candidates.log_likelihoods
     hopeful = int(np.sum(log_likelihoods >= log_likelihoods[0] - _HOPELESS_NATS))
     most = hopeful * len(epochs)

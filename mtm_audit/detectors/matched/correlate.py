@@ -29,32 +29,33 @@ class Prepared:
     """A motion made ready for correlation.
 
     `filtered` (observed axes, n): whitened, weighted and whitened backwards, in units of the noise; `weights`
-    (observed axes, n) as in the noise model, whose filter is `noise_filter`.
+    (observed axes, n), `scales` (observed axes,) and `noise_filters` (observed axes, order + 1) as in the noise model.
     """
 
     motion: Motion
     filtered: Floats
     weights: Floats
-    noise_filter: Floats
+    scales: Floats
+    noise_filters: Floats
 
 
 def prepare(motion: Motion, noise: NoiseModel, observation: int) -> Prepared:
     """Whiten, weight, and whiten backwards (the adjoint), so that correlating with a plain template is matched."""
-    weights, scales = noise.weights[observation], noise.scales[observation]
+    filters, weights, scales = noise.filters[observation], noise.weights[observation], noise.scales[observation]
     order = noise.order
-    errors = whitened(motion.velocities, noise.filter) * weights[:, order:] / scales[:, None]
+    errors = whitened(motion.velocities, filters) * weights[:, order:] / scales[:, None]
     silent = np.zeros((len(errors), order))
-    filtered = whitened(np.concatenate([silent, errors[:, ::-1], silent], axis=1), noise.filter)[:, ::-1]
-    return Prepared(motion, filtered, weights, noise.filter)
+    filtered = whitened(np.concatenate([silent, errors[:, ::-1], silent], axis=1), filters)[:, ::-1]
+    return Prepared(motion, filtered, weights, scales, filters)
 
 
 @dataclass(frozen=True)
 class Heard:
     """The motion correlated with each tone at each lag, at one rate; the same for every codebook.
 
-    `projections` (observed axes, 2 K, lags): real and imaginary parts; `tones_hz` (K,); `steady` (2 K,) power of each
-    tone's whitened response in a cell; `seen` (observed axes, lags) weight of the cells that a window starting there
-    would have. Lag 0 is `lead` cells before the recording.
+    `projections` (observed axes, 2 K, lags): real and imaginary parts; `tones_hz` (K,); `steady` (observed axes,
+    2 K) power of each tone's whitened response in a cell; `seen` (observed axes, lags) weight of the cells that a
+    window starting there would have. Lag 0 is `lead` cells before the recording.
     """
 
     projections: NDArray[np.float32]
@@ -81,9 +82,9 @@ def hear(prepared: Prepared, codebook: Codebook, channel: Channel, rate_hz: floa
     projections = np.concatenate([heard.real, heard.imag], axis=1)
     weights = np.zeros((len(prepared.weights), size))
     weights[:, lead : lead + count] = prepared.weights
-    steady = settled * power_response(prepared.noise_filter, tones_hz * motion.step_s)
+    steady = settled * power_response(prepared.noise_filters, tones_hz * motion.step_s)
     seen = np.maximum(_moving_sum(weights, cells)[:, :lags], 0.0)
-    return Heard(projections, tones_hz, np.concatenate([steady, steady]), seen)
+    return Heard(projections, tones_hz, np.concatenate([steady, steady], axis=1), seen)
 
 
 @lru_cache(maxsize=160)
@@ -116,8 +117,10 @@ def stacked_tones(codebook: Codebook, channel: Channel, number: int, symbols: Se
 
 
 def template_power(tones: Tones, heard: Heard) -> Floats:
-    """Mean power of a candidate's whitened template in a fully seen cell, for each axis; candidates differ little."""
-    power: Floats = ((tones**2).mean(axis=0) @ heard.steady) / 2.0
+    """Mean power of a candidate's whitened template in a fully seen cell, (observed axes, axes); candidates differ
+    little.
+    """
+    power: Floats = heard.steady @ (tones**2).mean(axis=0).T / 2.0
     return power
 
 
@@ -144,8 +147,8 @@ def _evidence_of(tones: Tones, heard: Heard) -> NDArray[np.float32]:
     # Waveforms differ little in power, so that one scale serves all candidates of a set.
     for axis in range(axes):
         flat = np.ascontiguousarray(tones[:, :, axis]).reshape(sets * count, width)
-        for projection, seen in zip(heard.projections, heard.seen, strict=True):
-            energy = (powers[:, axis, None] * seen).astype(np.float32)
+        for row, (projection, seen) in enumerate(zip(heard.projections, heard.seen, strict=True)):
+            energy = (powers[:, row, axis, None] * seen).astype(np.float32)
             correlation = flat @ projection
             correlation *= correlation
             scale = np.float32(0.5 * GAIN_VARIANCE) / (1.0 + np.float32(GAIN_VARIANCE) * energy)

@@ -1,6 +1,6 @@
 """The matched detector behind the common interface."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -49,8 +49,9 @@ class MatchedDetector:
 
         The strength is the evidence that the search found, so decoys need no more than the search.
         """
-        motions, refusals = _motions([observation.glimpse for observation in observations], codebook)
-        prepared = _prepared(motions)
+        glimpses = [observation.glimpse for observation in observations]
+        motions, refusals = _motions(glimpses, codebook)
+        prepared = _prepared(motions, glimpses)
         channels = {number: observations[number].channel for number in motions}
         alone = _searched([codebook, *decoys], channels, prepared, onset, progress)
         searched = _shared([codebook, *decoys], channels, prepared, alone, onset)
@@ -59,7 +60,9 @@ class MatchedDetector:
             if refusal is not None:
                 refusals[number] = refusal
                 del motions[number]
-        readings = self._read_together(codebook, channels, prepared, list(motions), searched, onset) if motions else {}
+        readings: dict[int, ChannelReading] = {}
+        for numbers in _kinds(motions, glimpses):
+            readings |= self._read_together(codebook, channels, prepared, numbers, searched, onset)
         for number, reading in readings.items():
             own = alone[number][0]
             readings[number] = replace(reading, alone=own.timing, alone_strength=own.evidence)
@@ -78,7 +81,7 @@ class MatchedDetector:
         result = np.full((len(codebooks), len(channels), len(glimpses)), np.nan)
         motions, _ = _motions(glimpses, codebooks[0])
         ticks = np.array([codebooks[0].scheme.window_ticks(channel) for channel in channels])
-        for column, prepared in _prepared(motions).items():
+        for column, prepared in _prepared(motions, glimpses).items():
             for length in np.unique(ticks):
                 rows = np.flatnonzero(ticks == length)
                 played = [(codebook, channels[int(row)]) for row in rows for codebook in codebooks]
@@ -104,12 +107,13 @@ class MatchedDetector:
         own = [channels[number] for number in numbers]
         noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
         timings = [searched[number][0].timing for number in numbers]
-        windows = _all_windows(codebook, own, moved, timings, onset)
+        shown = [_numbers(codebook, *each, onset) for each in zip(own, moved, timings, strict=True)]
+        windows = _all_windows(codebook, own, moved, timings, shown)
         found = estimate(windows, moved, noise, self._profile)
         better = refined_timing(found, windows, moved, timings)
         if better != timings:
             timings = better
-            windows = _all_windows(codebook, own, moved, timings, onset)
+            windows = _all_windows(codebook, own, moved, timings, shown)
             found = estimate(windows, moved, noise, self._profile)
         readings = {}
         for row, number in enumerate(numbers):
@@ -133,15 +137,22 @@ def _motions(glimpses: Sequence[Glimpse], codebook: Codebook) -> tuple[dict[int,
     return motions, refusals
 
 
-def _prepared(motions: dict[int, Motion]) -> dict[int, Prepared]:
-    """Each motion whitened by what all of them show of the interference, along axes that they share."""
-    if not motions:
-        return {}
-    turned = _along_principal_axes(list(motions.values()))
-    noise = fit_recording_noise(turned, [motion.velocities for motion in turned])
-    return {
-        number: prepare(motion, noise, row) for row, (number, motion) in enumerate(zip(motions, turned, strict=True))
-    }
+def _kinds(motions: Iterable[int], glimpses: Sequence[Glimpse]) -> list[list[int]]:
+    """Numbers of the motions whose glimpses have the same axes, which are of one unit and of plants alike."""
+    kinds: dict[tuple[str, ...], list[int]] = {}
+    for number in motions:
+        kinds.setdefault(glimpses[number].axes, []).append(number)
+    return list(kinds.values())
+
+
+def _prepared(motions: dict[int, Motion], glimpses: Sequence[Glimpse]) -> dict[int, Prepared]:
+    """Each motion whitened by what all of its kind show of the interference, along axes that they share."""
+    prepared: dict[int, Prepared] = {}
+    for numbers in _kinds(motions, glimpses):
+        turned = _along_principal_axes([motions[number] for number in numbers])
+        noise = fit_recording_noise(turned, [motion.velocities for motion in turned])
+        prepared |= {number: prepare(turned[row], noise, row) for row, number in enumerate(numbers)}
+    return {number: prepared[number] for number in motions}
 
 
 def _searched(
@@ -180,8 +191,6 @@ def _shared(
 
 def _along_principal_axes(motions: Sequence[Motion]) -> list[Motion]:
     """The motions turned into axes of uncorrelated interference, the same for all that one camera sees."""
-    if len({len(motion.velocities) for motion in motions}) > 1:
-        return list(motions)
     signals = [motion.velocities for motion in motions]
     rotation = principal_axes(signals, fit_recording_noise(motions, signals))
     return [replace(motion, velocities=rotation @ motion.velocities) for motion in motions]
@@ -196,12 +205,11 @@ def _all_windows(
     channels: Sequence[Channel],
     motions: Sequence[Motion],
     timings: Sequence[Timing],
-    onset: Onset,
+    shown: Sequence[range],
 ) -> list[Window]:
     windows = []
-    for number, (channel, motion, timing) in enumerate(zip(channels, motions, timings, strict=True)):
-        numbers = _numbers(codebook, channel, motion, timing, onset)
-        windows += make_windows(codebook, channel, motion, timing, number, numbers)
+    for row, (channel, motion, timing, numbers) in enumerate(zip(channels, motions, timings, shown, strict=True)):
+        windows += make_windows(codebook, channel, motion, timing, row, numbers)
     return windows
 
 

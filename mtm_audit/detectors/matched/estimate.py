@@ -14,7 +14,7 @@ from scipy.special import log_softmax, softmax
 
 from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, half_log_evidence, log_sum_exp
 from mtm_audit.detectors.matched.motion import Motion
-from mtm_audit.detectors.matched.noise import NoiseModel, fit_noise, model_order
+from mtm_audit.detectors.matched.noise import NoiseModel, fit_noise_by_axis, model_order
 from mtm_audit.detectors.matched.plants import COARSE, FINE
 from mtm_audit.detectors.matched.profile import PlantProfile, log_prior
 from mtm_audit.detectors.matched.windows import Statistics, Window, response_rows, statistics
@@ -38,9 +38,9 @@ class _Judged:
 
 
 def fit_recording_noise(motions: Sequence[Motion], signals: Sequence[Floats]) -> NoiseModel:
-    """The noise model of what `signals` hold, with an order that so many samples carry."""
+    """The noise model of what `signals` hold, with orders that so many samples carry."""
     samples = sum(signal.size for signal in signals)
-    return fit_noise(signals, [motion.seen for motion in motions], model_order(samples))
+    return fit_noise_by_axis(signals, [motion.seen for motion in motions], model_order(samples))
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,9 @@ class Places:
 class Projections:
     """A body's motion projected on the tones, in units of its interference.
 
-    `linear` (timings, plants, groups, observed axes, 2 K): correlations with unit tones, real parts first; `seen`
-    (timings, groups, observed axes): how many cells count; `power` (plants, K): of a unit tone's whitened response in a
+    One unit for all axes, since a camera turns axes into each other whose interference differs. `linear` (timings,
+    plants, groups, observed axes, 2 K): correlations with unit tones, real parts first; `seen` (timings, groups,
+    observed axes): how many cells count; `power` (plants, observed axes, K): of a unit tone's whitened response in a
     cell; `cells`: how many a window has.
     """
 
@@ -50,6 +51,7 @@ def project(prepared: Prepared, places: Places) -> Projections:
     lasting = int(np.ceil((places.length_s + TAIL_S) / step_s))
     middles_s = (np.arange(lasting) + 0.5) * step_s
     responses = tone_responses(places.plants, places.tones_hz, middles_s, places.length_s)
+    relative = _relative_precision(prepared.scales)
     lags = (places.starts_s - motion.start_s) / step_s
     whole = np.rint(lags).astype(np.int64)
     padded = np.pad(prepared.filtered, ((0, 0), (lasting, lasting)))
@@ -65,8 +67,15 @@ def project(prepared: Prepared, places: Places) -> Projections:
     linear = np.zeros((len(lags), len(responses), number, len(padded), 2 * len(places.tones_hz)))
     counted = np.zeros((len(lags), number, len(padded)))
     for window, group in enumerate(places.groups):
-        linear[:, :, group] += np.concatenate([heard[:, :, window].real, heard[:, :, window].imag], axis=-1)
+        whole_tones = np.concatenate([heard[:, :, window].real, heard[:, :, window].imag], axis=-1)
+        linear[:, :, group] += whole_tones * relative[:, None]
         counted[:, group] += seen[:, window]
     settled = tone_responses(places.plants, places.tones_hz, np.array([MEMORY_S]), 2.0 * MEMORY_S)[:, :, 0]
-    power = np.abs(settled) ** 2 * power_response(prepared.noise_filter, places.tones_hz * step_s)
-    return Projections(linear, counted, power, places.length_s / step_s)
+    filtered = power_response(prepared.noise_filters, places.tones_hz * step_s) * relative[:, None] ** 2
+    return Projections(linear, counted, np.abs(settled[:, None]) ** 2 * filtered, places.length_s / step_s)
+
+
+def _relative_precision(scales: Floats) -> Floats:
+    """How quiet each axis is beside all of them together (axes,); 1 where all are alike."""
+    precisions = 1.0 / np.maximum(scales, 1e-12 * max(float(scales.max()), 1e-300))
+    return np.asarray(precisions / np.sqrt(np.mean(precisions**2)))

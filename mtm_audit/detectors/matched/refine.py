@@ -61,10 +61,10 @@ def _delays(found: Estimate, index: int, window: Window, motion: Motion) -> list
     signal, residual, noise = found.signals[index], found.residuals[window.observation], found.noise
     if signal.shape[1] <= noise.order + 1:
         return []
-    scales = noise.scales[window.observation][:, None]
+    filters, scales = noise.filters[window.observation], noise.scales[window.observation][:, None]
     weights = noise.weights[window.observation][:, window.first + noise.order : window.last]
-    moved = whitened(-np.gradient(signal, motion.step_s, axis=1), noise.filter) / scales
-    left = whitened(residual[:, window.first : window.last], noise.filter) / scales
+    moved = whitened(-np.gradient(signal, motion.step_s, axis=1), filters) / scales
+    left = whitened(residual[:, window.first : window.last], filters) / scales
     middles_s = motion.middles_s[window.first + noise.order : window.last]
     pieces = []
     for chosen in np.array_split(np.arange(moved.shape[1]), max(1, round(moved.shape[1] * motion.step_s / _PIECE_S))):

@@ -114,20 +114,30 @@ def statistics(window: Window, tones: Floats, rows: Floats, noise: NoiseModel, r
 
     `residual` is the observed motion less what all other windows are believed to add.
     """
-    order = noise.order
+    order, filters = noise.order, noise.filters[window.observation]
     before = max(0, window.first - order)
-    observed = whitened(residual[:, before : window.last], noise.filter)
+    observed = whitened(residual[:, before : window.last], filters)
     scales = noise.scales[window.observation]
     weights = noise.weights[window.observation][:, before + order : window.last]
     count, axes, width = tones.shape
     flat = tones.reshape(count * axes, width)
     pulled = weights / scales[:, None] * observed
+    information = np.empty((len(pulled), count, len(rows), axes))
+    precision = np.empty((len(pulled), count, len(rows), axes, axes))
+    few = len(flat) <= width
     # Few candidates are cheapest as waveforms, many as quadratic forms of their tones; either way what is fewer is
-    # whitened.
-    if len(flat) <= width:
-        waveforms = _whitened_from_start(flat @ rows, window.first - before, noise.filter)
-        return _from_waveforms(waveforms.reshape(len(rows), count, axes, -1), pulled, weights)
-    return _from_tones(flat, axes, _whitened_from_start(rows, window.first - before, noise.filter), pulled, weights)
+    # whitened, once for all axes whose filter is the same.
+    signals = flat @ rows if few else rows
+    for own in np.unique(filters, axis=0):
+        mine = np.flatnonzero(np.all(filters == own, axis=1))
+        heard = _whitened_from_start(signals, window.first - before, own)
+        found = (
+            _from_waveforms(heard.reshape(len(rows), count, axes, -1), pulled[mine], weights[mine])
+            if few
+            else _from_tones(flat, axes, heard, pulled[mine], weights[mine])
+        )
+        information[mine], precision[mine] = found.information, found.precision
+    return Statistics(information, precision)
 
 
 def _whitened_from_start(signals: Floats, history: int, whitening_filter: Floats) -> Floats:

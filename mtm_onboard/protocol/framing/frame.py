@@ -12,6 +12,7 @@ from mtm_onboard.protocol.framing.code import decode_symbols, encode_symbols
 from mtm_onboard.protocol.framing.framing import Framing, layout_of
 from mtm_onboard.protocol.framing.payload import Payload, bits_of_payload, payload_of_bits
 from mtm_onboard.protocol.framing.symbols import number_of_symbols, symbols_of_number
+from mtm_onboard.protocol.tag_key import TagKey
 
 if TYPE_CHECKING:
     from mtm_onboard.protocol.scheme import Scheme
@@ -26,7 +27,7 @@ class Frame:
 
 
 def encode_frame(
-    payload: Payload, scheme: Scheme, secret: bytes, *, number: int = 0, epoch: int = 0
+    payload: Payload, scheme: Scheme, secret: bytes | TagKey, *, number: int = 0, epoch: int = 0
 ) -> tuple[int, ...]:
     """The L symbols of a message, in frame order; a scheme without framing writes a plain number.
 
@@ -42,7 +43,7 @@ def encode_frame(
     return encode_symbols([frame_data(payload, framing, secret, number, epoch)], layout)[0]
 
 
-def decode_frame(symbols: Sequence[int | None], scheme: Scheme, secret: bytes, *, epoch: int = 0) -> Frame:
+def decode_frame(symbols: Sequence[int | None], scheme: Scheme, secret: bytes | TagKey, *, epoch: int = 0) -> Frame:
     """The frame in L symbols given in frame order, None where one was not seen.
 
     Raises MtmError when too many are wrong or missing, and when they spell no frame or its check does not hold.
@@ -62,7 +63,7 @@ def decode_frame(symbols: Sequence[int | None], scheme: Scheme, secret: bytes, *
     return frame
 
 
-def frame_data(payload: Payload, framing: Framing, secret: bytes, number: int, epoch: int) -> int:
+def frame_data(payload: Payload, framing: Framing, secret: bytes | TagKey, number: int, epoch: int) -> int:
     """A frame's `data_bits` as one number: number, length field, payload, check, most significant bit first."""
     if number < 0:
         raise MtmError(f"the message's number is {number}; count from 0")
@@ -72,7 +73,7 @@ def frame_data(payload: Payload, framing: Framing, secret: bytes, number: int, e
     return (carried << (framing.length_bits + framing.payload_bits) | body) << framing.check_bits | check
 
 
-def frame_of_data(data: int, framing: Framing, secret: bytes, epoch: int) -> Frame | None:
+def frame_of_data(data: int, framing: Framing, secret: bytes | TagKey, epoch: int) -> Frame | None:
     """The inverse of `frame_data`; None when the check does not hold or no payload is written so."""
     content, check = data >> framing.check_bits, data & ((1 << framing.check_bits) - 1)
     width = framing.length_bits + framing.payload_bits

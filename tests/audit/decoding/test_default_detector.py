@@ -90,7 +90,11 @@ def test_two_robots_that_play_one_channel_are_told(seed):
 
 def briefly(track, first_s, last_s):
     shown = (track.times_s > first_s) & (track.times_s < last_s)
-    return replace(track, times_s=track.times_s[shown], positions=track.positions[shown], valid=track.valid[shown])
+    headings_rad = None if track.headings_rad is None else track.headings_rad[shown]
+    return replace(
+        track, times_s=track.times_s[shown], positions=track.positions[shown], valid=track.valid[shown],
+        headings_rad=headings_rad,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -7,7 +7,7 @@ import pytest
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.recorded_at import RecordedAt
-from mtm_audit.reporting.delivery import frame_sentences
+from mtm_audit.reporting.delivery import clock_sentence, frame_sentences, late_s
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.framing import Framing
 from mtm_onboard.protocol.slots import slot_at
@@ -87,6 +87,19 @@ def test_a_rolling_message_is_found_by_the_clock(clock_s):
     assert (decoding.verdict, decoding.message) == ("decoded", 1234)
     assert decoding.frames[0].message.authenticated
     assert "2026-01-31 12:00:00 UTC" in frame_sentences(decoding)[0]
+
+
+@pytest.mark.parametrize("clock_s", [-4.0, 0.0, 7.5])
+def test_a_motion_later_than_its_slot_may_be_a_relay(clock_s):
+    # A recording whose clock is behind shows the motion early, and one whose clock is ahead, or a relay, shows it late.
+    settings = replace(SETTINGS, at=RecordedAt(NOON_S - 1.0 + clock_s, 8.0))
+    decoding = decode_tracks(rolling_tracks(), ROLLING, settings)
+    assert late_s(decoding) == pytest.approx(clock_s, abs=0.3)
+    told = clock_sentence(decoding)
+    assert ("could be a relay of" in told) is (clock_s > 1.0)
+    if clock_s > 1.0:
+        assert "relay of 8 s" in told
+        assert "--at-error 2" in told
 
 
 def test_yesterdays_motion_shown_today_is_no_message():

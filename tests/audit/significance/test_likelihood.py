@@ -142,7 +142,8 @@ def test_windows_played_alike_are_one_waveform(power):
 def test_the_approximation_is_exact_where_axes_are_seen_alike():
     """And the law is the normal one; it chooses the hypotheses that are then weighed exactly."""
     ready = prepared()
-    alike = projected(replace(ready, weights=np.broadcast_to(ready.weights.mean(axis=0), ready.weights.shape)))
+    weights = np.broadcast_to(ready.weights.mean(axis=0), ready.weights.shape)
+    alike = projected(replace(ready, weights=weights, scales=np.ones(len(weights))))
     timings, plants = np.array([0, 1]), np.array([3, 5])
     tones = both_groups(waveforms("ensemble")[:6])
     table = approximate_log_e(alike, tones, all_levels(), TURNS, timings, plants)

@@ -114,7 +114,7 @@ def test_what_was_sent_is_found_with_evidence_for_each_symbol():
     assert tuple(item.symbol for item in found.symbols) == SENT
     assert min(item.nats for item in found.symbols) > 5.0
     assert found.presence_nats > 20.0
-    assert found.presence_nats == found.channels_nats[0]
+    assert found.channels_nats == {"robot0": found.presence_nats}
 
 
 @pytest.mark.parametrize("share", [0.2, 0.02])
@@ -147,7 +147,7 @@ def test_choosing_a_track_costs_what_it_costs():
     terms = terms_of(REPEATING, Codebook(secret(1), REPEATING), prepared(), 4)
     free, paid = (weigh_message([terms], [cost], 2) for cost in (0.0, -2.5))
     assert paid.presence_nats == pytest.approx(free.presence_nats - 2.5)
-    assert paid.channels_nats == pytest.approx([free.channels_nats[0] - 2.5])
+    assert paid.channels_nats == pytest.approx({name: nats - 2.5 for name, nats in free.channels_nats.items()})
     for dear, cheap in zip(paid.symbols, free.symbols, strict=True):
         assert dear.nats == pytest.approx(cheap.nats - 2.5)
 
@@ -167,16 +167,16 @@ def test_no_motion_is_no_evidence_and_always_a_number(seen):
 def test_a_channel_that_says_nothing_costs_the_others_little():
     """Each channel may be silent, with a prior; a silent one does not take away what another shows."""
     speaks = terms_of(LARGE, Codebook(FAKE_SECRET, LARGE), sent(), 6, None, ranked(*([symbol] for symbol in SENT)))
-    silent = terms_of(LARGE, Codebook(secret(3), LARGE), sent(), 6, None)
+    silent = replace(terms_of(LARGE, Codebook(secret(3), LARGE), sent(), 6, None), name="robot1")
     alone = weigh_message([speaks], [0.0], 3, symbols=False)
     both = weigh_message([speaks, silent], [0.0, 0.0], 3, symbols=False)
     assert both.presence_nats > alone.presence_nats - 4.0
-    assert both.channels_nats[0] == pytest.approx(alone.channels_nats[0])
+    assert both.channels_nats["robot0"] == pytest.approx(alone.channels_nats["robot0"])
     assert both.symbols == (None, None, None)
 
 
 def test_the_hypothesis_of_one_channel_helps_another():
     """Two robots that play alike are more evidence together than the sum of what each says alone."""
     terms = terms_of(LARGE, Codebook(FAKE_SECRET, LARGE), sent(), 6, None, ranked(*([symbol] for symbol in SENT)))
-    both = weigh_message([terms, terms], [0.0, 0.0], 3, symbols=False)
-    assert both.presence_nats > sum(both.channels_nats)
+    both = weigh_message([terms, replace(terms, name="robot1")], [0.0, 0.0], 3, symbols=False)
+    assert both.presence_nats > sum(both.channels_nats.values())

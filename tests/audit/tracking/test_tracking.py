@@ -163,7 +163,8 @@ def test_a_picture_that_changes_its_size_is_refused(name, depth):
     ("name", "says"),
     [
         ("magic", "no tracker 'magic'"),
-        ("aruco:5x5", "no tracker"),
+        ("aruco:5x5", "no dictionary of markers '5x5'"),
+        ("aruco:6x6_250,4x4_50", "more than one dictionary"),
         ("colour", "no tracker"),
         ("colour:", "no tracker"),
         ("colour:mauve-ish", "no colour"),
@@ -179,7 +180,7 @@ def test_an_unknown_tracker_is_refused_with_the_choices(name, says):
 def test_searching_nearby_finds_what_searching_everywhere_finds(tmp_path, monkeypatch):
     path = filmed(Camera(), tmp_path / "film.mp4")
     nearby = ArucoTracker().track(read_frames(path))
-    monkeypatch.setattr("mtm_audit.tracking.aruco.FULL_SEARCH_EVERY", 1)
+    monkeypatch.setattr("mtm_audit.tracking.follower.FULL_SEARCH_EVERY_S", 0.0)
     everywhere = ArucoTracker().track(read_frames(path))
     for one, other in zip(nearby, everywhere, strict=True):
         assert np.array_equal(one.valid, other.valid)

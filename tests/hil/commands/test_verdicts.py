@@ -26,18 +26,18 @@ def test_validity_writes_a_row_for_each_level_and_one_kind_alone(tmp_path, capsy
 
 
 def test_sure_goes_on_from_the_cells_that_are_finished(tmp_path, capsys, monkeypatch):
-    assert run(*quick(tmp_path, "sure"), "--only", "tanh gain") == 0
+    assert run(*quick(tmp_path, "sure"), "--only", "tanh") == 0
     table = (tmp_path / "a.csv").read_text()
-    assert table.count("tanh gain,") == 3
+    assert table.count("tanh,") == 3
     monkeypatch.setattr("hil.commands.verdicts.decode_sent", None)
-    assert run(*quick(tmp_path, "sure"), "--only", "tanh gain") == 0
+    assert run(*quick(tmp_path, "sure"), "--only", "tanh") == 0
     assert (tmp_path / "a.csv").read_text() == table
 
 
 def test_a_name_that_is_not_known_gets_one_sentence(tmp_path, capfd):
     assert run(*quick(tmp_path, "sure"), "--only", "hovercraft") == 1
     error = capfd.readouterr().err
-    assert "there is no 'hovercraft' to measure; choose from: calibrated; " in error
+    assert "there is no 'hovercraft' to measure; choose from: robomaster; " in error
     assert error.count("\n") == 1
     assert not (tmp_path / "a.csv").exists()
 

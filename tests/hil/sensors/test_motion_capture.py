@@ -4,7 +4,7 @@ import pytest
 from hil.sensors.motion_capture import MotionCapture, capture, write_tum, write_tum_files
 from hil.sensors.poses import Occlusion, Trajectory
 from mtm_audit.model.track import Track
-from mtm_audit.readers.motion_capture import read_tum
+from mtm_audit.readers.logs.registry import read_log
 from mtm_onboard.protocol import MtmError
 
 
@@ -63,13 +63,13 @@ def test_a_recording_comes_back_from_its_files_with_its_gaps(tmp_path):
     paths = write_tum_files(tracks, tmp_path)
     assert [path.name for path in paths] == ["robot0.tum", "robot1.tum"]
     for track, path in zip(tracks, paths, strict=True):
-        back = read_tum(path)
+        (back,) = read_log(path).tracks
         assert back.name == track.name
         assert back.valid.all()
         assert back.times_s == pytest.approx(track.times_s[track.valid], abs=1e-6)
         assert back.positions == pytest.approx(track.positions[track.valid], abs=1e-6)
         assert wrapped(back.headings_rad - track.headings_rad[track.valid]) == pytest.approx(0, abs=1e-5)
-    assert np.diff(read_tum(paths[1]).times_s).max() == pytest.approx(1.0, abs=0.1)
+    assert np.diff(read_log(paths[1]).tracks[0].times_s).max() == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_track_without_headings_cannot_become_a_pose_file(tmp_path):

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from hil.plants.body_path import path_xy_m
-from hil.worlds.open_loop import spinning, steering, stop_and_go, wander, zigzag
+from hil.plants.robots import path
+from hil.worlds.open_loop import cruise, pick_and_place, spinning, steering, stop_and_go, wander, zigzag
 
 COUNT, STEP_S = 3000, 0.01
 
@@ -11,7 +11,7 @@ def driven(task):
     return task(COUNT, STEP_S, np.random.default_rng(4))
 
 
-@pytest.mark.parametrize("task", [zigzag, wander, stop_and_go, steering, spinning])
+@pytest.mark.parametrize("task", [zigzag, wander, stop_and_go, steering, spinning, pick_and_place, cruise])
 def test_a_task_fills_its_run_and_differs_with_the_draw(task):
     velocities = driven(task)
     assert velocities.shape == (COUNT, 3)
@@ -37,4 +37,16 @@ def test_steering_never_goes_sideways():
 
 def test_a_spinning_body_goes_where_a_smooth_course_leads():
     course = np.cumsum(driven(wander)[:, :2], axis=0) * STEP_S
-    assert np.abs(path_xy_m(driven(spinning), STEP_S) - course).max() < 1e-9
+    assert np.abs(path(driven(spinning), STEP_S)[:, :2] - course).max() < 1e-9
+
+
+def test_a_tool_stays_at_its_place_of_work():
+    path_m = np.cumsum(driven(pick_and_place)[:, :2], axis=0) * STEP_S
+    assert np.abs(path_m).max() < 0.16
+    assert np.ptp(path_m, axis=0).min() > 0.1
+
+
+def test_a_heavy_vehicle_can_follow_its_course():
+    velocities = cruise(60_000, STEP_S, np.random.default_rng(4))[:, :2]
+    assert velocities.std(axis=0) == pytest.approx([0.35, 0.35], rel=0.15)
+    assert np.sqrt(np.mean(np.square(np.diff(velocities, axis=0)))) / STEP_S == pytest.approx(0.22, rel=0.1)

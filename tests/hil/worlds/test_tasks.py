@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 from hil.fleet.lockstep import run_lockstep
+from hil.plants.robots import SteppedRobot
 from hil.worlds.robomaster import routes
-from hil.worlds.tasks import TASKS, random_task
+from hil.worlds.tasks import TASKS, random_task, steer_to_goal
+from hil.worlds.vehicles import VEHICLES, arena_task
+from mtm_onboard.model.velocity import STOP
 from tests.hil.fleet.short_runs import short_run
 
 SECONDS = 12.0
@@ -106,3 +109,24 @@ def test_a_hovering_robot_is_thrown_and_comes_back():
 def test_robots_of_one_run_are_given_different_errands():
     kinds = {type(random_task(ROUTE, seed)).__name__ for seed in range(40)}
     assert len(kinds) == len(TASKS)
+
+
+@pytest.mark.parametrize("name", ["diff-drive", "spinning"])
+def test_a_robot_of_another_kind_reaches_the_first_points(name):
+    def chassis(seed, place):
+        return SteppedRobot(VEHICLES[name].kind.draw(np.random.default_rng(seed)), seed, place)
+
+    settings = short_run(symbols=None, seconds=SECONDS, seed=1, task=arena_task(name), chassis=chassis)
+    positions_m = run_lockstep(settings).trajectories[0].positions_xy_m
+    for point in routes((0, 1, 2, 3))[0].points_xy_m[:2]:
+        assert np.min(np.hypot(*(positions_m - point).T)) < 0.25
+
+
+def test_a_steered_robot_is_never_sent_sideways():
+    task = steer_to_goal(ROUTE, 0)
+    commands = [task.command(ROUTE.start_xy_m, heading_rad) for heading_rad in np.linspace(-4.0, 4.0, 30)]
+    assert all(command.vy_mps == 0.0 and command.vx_mps >= 0.0 for command in commands)
+    assert task.command(ROUTE.points_xy_m[-1], 0.0) != STOP
+    for point in ROUTE.points_xy_m:
+        last = task.command(point, 0.0)
+    assert last == STOP

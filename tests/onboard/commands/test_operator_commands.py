@@ -92,7 +92,7 @@ def test_show_says_in_words_what_a_frame_holds(tmp_path, capsys):
     for fact in ("120 s, 80 symbols", "up to 8 bytes of text: 64 bits, 0.533 bits/s", "modulo 16", "tag of 32 bits",
                  "GF(2^6), 8 of 26 code symbols parity", "4 wrong or 8 missing", ", interleaved"):  # fmt: skip
         assert fact in shown
-    assert load_key(tmp_path / "robot.key").secret.hex() not in shown
+    assert load_key(tmp_path / "robot.key").secret.master.hex() not in shown
 
 
 @pytest.mark.parametrize(

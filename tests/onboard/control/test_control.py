@@ -1,9 +1,11 @@
 import json
 import math
+from itertools import count
 
 import pytest
 
 from mtm_onboard.control.control import Control, Session
+from mtm_onboard.control.slot_watch import Playing
 from mtm_onboard.journal.journal import Journal, JournalHeader, read_journal
 from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
@@ -40,10 +42,10 @@ class Robot:
         self.modulator = Ticking(codebook, "a", SILENCE if content is None else message_of(content, key))
         self.guard = Guard(Limits(1.0, 2.0), Staleness(), noise_sigma=0.1, period_s=0.02)
         self.stats, self.source = LoopStats(), HeldSource()
+        playing = Playing(modulator=self.modulator, first_tick=0, first_slot=FIRST_SLOT, start_unix_s=START_UNIX_S)
         session = Session(
             robot="robot0",
             key=key,
-            modulator=self.modulator,
             guard=self.guard,
             source=self.source,
             transport=NullLink(),
@@ -51,8 +53,10 @@ class Robot:
             journal=journal,
             now_s=lambda: (self.tick + 0.5) / 50.0,
             start_s=0.0,
-            start_unix_s=START_UNIX_S,
-            first_slot=FIRST_SLOT,
+            playing=lambda: playing,
+            plays=self.modulator.sends,
+            clock_doubt=str,
+            take_number=count(1).__next__,
         )
         self.control = Control(session)
 

@@ -11,12 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mtm_onboard.control.control_socket import ControlSocket, ask
-from mtm_onboard.control.session import Outcome, Plan, run_session, start_of
+from mtm_onboard.control.session import Ends, Outcome, Plan, run_session, start_of
 from mtm_onboard.journal.journal import read_journal
 from mtm_onboard.links.none import NullLink
+from mtm_onboard.model.clock import SystemClock
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.protocol.framing import Framing
+from mtm_onboard.protocol.journal_noise import with_noise
 from mtm_onboard.protocol.slots import slot_start_unix_s
 from mtm_onboard.runtime.config import config_from_table
 from mtm_onboard.runtime.guard import NOISE, STOPPED
@@ -65,7 +67,7 @@ class Running:
         self._thread = threading.Thread(target=self._run, args=(config, key, plan))
 
     def _run(self, config, key, plan) -> None:
-        self._outcome = run_session(config, key, plan, self._ending.is_set)
+        self._outcome = run_session(config, key, replace(plan, allow_unsynchronised=True), self._ending.is_set)
 
     def __enter__(self):
         self._thread.start()
@@ -99,7 +101,7 @@ def test_a_message_begins_exactly_at_the_boundary_answered(config):
         while asked(config, command="status")["tick"] < answer["tick"] + 3:
             pass
         outcome = running.end()
-    record = read_journal(outcome.journal.path)
+    record = with_noise(read_journal(outcome.journal.path), KEY)
     assert slot_start_unix_s(answer["slot"], SCHEME) == pytest.approx(answer["unix_s"], abs=1e-6)
     first_slot = answer["slot"] - answer["tick"] // 30
     assert record.header.start_unix_s == slot_start_unix_s(first_slot, SCHEME)
@@ -132,15 +134,15 @@ def test_a_robot_without_a_message_is_silent_before_and_after(config, schedule):
         while asked(config, command="status")["tick"] < ended["tick"] + 3:
             pass
         outcome = running.end()
-    assert (before["message"], before["silent"], during["message"], during["silent"]) == ("silence", True, 1, False)
+    assert (before["message"], before["silent"], during["message"], during["silent"]) == ("silence", True, 0, False)
     assert begun["tick"] % 30 == ended["tick"] % 30 == 0
-    record = read_journal(outcome.journal.path)
+    record = with_noise(read_journal(outcome.journal.path), key)
     assert record.header.symbols is None
     noisy = (record.sent != record.base).any(axis=1)
     within = (record.ticks >= begun["tick"]) & (record.ticks < ended["tick"])
     assert not noisy[~within].any()
     assert np.mean(noisy[within]) > 0.9
-    modulator = Modulator(key.codebook((begun["slot"] or 0) - begun["tick"] // 30), "a", message_of(50, key, 1))
+    modulator = Modulator(key.codebook((begun["slot"] or 0) - begun["tick"] // 30), "a", message_of(50, key, 0))
     noise = np.array([modulator.perturbation(tick) for tick in record.ticks.tolist()])
     calm = within & (record.flags == NOISE)
     assert (record.sent - record.base)[calm, :2] == pytest.approx(0.1 * noise[calm], abs=1e-6)
@@ -162,7 +164,7 @@ def test_a_session_without_its_control_socket_opens_no_link(config, monkeypatch)
     link = NullLink()
     monkeypatch.setattr("mtm_onboard.control.session.make_link", lambda kind, options: link)
     with ControlSocket(Path(config.control.socket)), pytest.raises(MtmError, match="another run"):
-        run_session(config, KEY, Plan(1), lambda: True)
+        run_session(config, KEY, Plan(1, allow_unsynchronised=True), lambda: True)
     assert link.sent == 0
 
 
@@ -192,10 +194,54 @@ def test_a_fixed_message_starts_when_it_was_told_to(now_s):
 
 
 def test_a_clock_never_set_is_refused_under_a_rolling_schedule(config, monkeypatch):
-    monkeypatch.setattr("mtm_onboard.control.session.time.time", lambda: 86_400.0)
+    monkeypatch.setattr("mtm_onboard.model.wall_clock.time.time", lambda: 86_400.0)
     with pytest.raises(MtmError, match="set the clock"):
         run_session(config, KEY, Plan(1), lambda: True)
     assert run_session(config, replace(KEY, scheme=FIXED), Plan(1), lambda: True).stats.sent == 0
+
+
+class Wall:
+    """The time of day of a computer, of which the kernel says `word`."""
+
+    def __init__(self, word: bool | None) -> None:
+        self._word = word
+
+    def unix_s(self) -> float:
+        return 1.8e9
+
+    def is_synchronised(self) -> bool | None:
+        return self._word
+
+
+def ends(word: bool | None) -> Ends:
+    return Ends(
+        source=Steady(), transport=NullLink(), clock=SystemClock(), simulated=False, source_name="s", link_name="l",
+        stop_by="hand", wall=Wall(word),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("word", [False, None])
+def test_a_clock_that_nobody_keeps_right_is_refused(config, word):
+    with pytest.raises(MtmError, match="--allow-unsynchronised"):
+        run_session(config, KEY, Plan(1), lambda: True, ends(word))
+    assert run_session(config, replace(KEY, scheme=FIXED), Plan(1), lambda: True, ends(word)).stats.sent == 0
+    assert run_session(config, KEY, Plan(1, allow_unsynchronised=True), lambda: True, ends(word)).stats.sent == 0
+    assert run_session(config, KEY, Plan(1), lambda: True, ends(True)).stats.sent == 0
+
+
+def test_a_rolling_run_needs_a_place_for_its_ledger(config):
+    with pytest.raises(MtmError, match=r"add \[state\]"):
+        run_session(replace(config, journal=None), KEY, Plan(1), lambda: True, ends(True))
+
+
+def test_numbers_of_messages_go_on_after_a_restart(config):
+    numbers = []
+    for _ in range(2):
+        with Running(config, KEY, Plan(13)) as running:
+            numbers.append(asked(config, command="status")["message"])
+            numbers.append(asked(config, command="send", content={"number": 50})["number"])
+            running.end()
+    assert numbers == [0, 1, 2, 3]
 
 
 @pytest.mark.parametrize("content", [64, "hi", b"hi", (0, 1, 2, 3)])

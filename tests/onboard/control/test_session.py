@@ -174,7 +174,7 @@ def test_a_link_that_comes_back_is_opened_and_its_losses_told(config, use):
 def test_steps_of_the_system_s_time_do_not_touch_a_run(config, use, monkeypatch):
     link, hours = use(Link()), count()
     # Set right, an hour back, two hours back ...
-    monkeypatch.setattr("mtm_onboard.control.session.time.time", lambda: 1.7e9 - 3600.0 * next(hours))
+    monkeypatch.setattr("mtm_onboard.model.wall_clock.time.time", lambda: 1.7e9 - 3600.0 * next(hours))
 
     class Impatient(SystemClock):
         def sleep_until(self, deadline_s: float) -> None:

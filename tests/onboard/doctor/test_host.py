@@ -1,11 +1,8 @@
-import subprocess
-import sys
-
 import pytest
 
 from hil.fleet.clock import SimulatedClock
 from mtm_onboard.doctor import host
-from mtm_onboard.doctor.host import check_clock, check_loop, check_processors, is_synchronised, lateness_finding
+from mtm_onboard.doctor.host import check_clock, check_loop, check_processors, lateness_finding
 from mtm_onboard.runtime.config import RealtimeSettings
 from mtm_onboard.runtime.loop import LoopStats
 from tests.onboard.schemes import small_scheme
@@ -16,25 +13,6 @@ SCHEME = small_scheme(band_hz=(0.5, 5.0))
 def test_only_a_rolling_schedule_needs_a_synchronised_clock():
     assert [check_clock("rolling", state).status for state in (True, False, None)] == ["pass", "fail", "warn"]
     assert [check_clock("fixed", state).status for state in (True, False, None)] == ["pass", "warn", "warn"]
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no adjtimex")
-def test_the_kernel_is_asked_as_others_ask_it(monkeypatch):
-    program = "import ctypes; b = ctypes.create_string_buffer(1024); print(ctypes.CDLL(None).adjtimex(b))"
-    asked = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    # Its answer is TIME_ERROR (5) for a clock that is not synchronised.
-    assert is_synchronised() is (int(asked.stdout) != 5)
-
-
-def test_a_system_that_does_not_say_is_neither(monkeypatch):
-    class Silent:
-        def __init__(self, answer):
-            if answer is not None:
-                self.adjtimex = lambda state: answer
-
-    for answer in (None, -1):
-        monkeypatch.setattr("ctypes.CDLL", lambda name, answer=answer: Silent(answer))
-        assert is_synchronised() is None
 
 
 @pytest.mark.parametrize(

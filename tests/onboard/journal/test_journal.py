@@ -1,4 +1,5 @@
 import errno
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -96,6 +97,18 @@ def test_a_journal_without_ticks_or_message_is_read_back(tmp_path):
     record = read_journal(journal.path)
     assert record.header == header
     assert (record.ticks.shape, record.sent.shape) == ((0,), (0, 3))
+
+
+def test_only_its_owner_reads_a_journal_and_its_segments(tmp_path):
+    former = os.umask(0)
+    try:
+        with Journal(tmp_path / "a.csv", HEADER, threaded=False, max_bytes=100_000) as journal:
+            write(journal, range(1000))
+    finally:
+        os.umask(former)
+    modes = {path.stat().st_mode & 0o777 for path in segments(journal.path)}
+    assert len(segments(journal.path)) > 1
+    assert modes == {0o600}
 
 
 def test_an_existing_journal_is_kept(tmp_path):

@@ -1,9 +1,11 @@
 import os
+import threading
+from contextlib import suppress
 
 import pytest
 
 from mtm_onboard.protocol import MtmError
-from mtm_onboard.protocol.atomicfile import replacing
+from mtm_onboard.protocol.atomicfile import replacing, write_new
 
 
 def test_a_file_appears_when_the_block_has_succeeded(tmp_path):
@@ -51,3 +53,32 @@ def test_a_folder_is_not_replaced_by_a_file(tmp_path):
     with pytest.raises(MtmError, match="Is a directory; name a file"), replacing(tmp_path / "a"):
         pass
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+def test_of_many_that_write_a_new_file_at_once_one_succeeds(tmp_path):
+    path, start, done = tmp_path / "a", threading.Barrier(8), []
+
+    def write(text):
+        start.wait()
+        with suppress(MtmError):
+            write_new(path, text, mode=0o600)
+            done.append(text)
+
+    for _ in range(50):
+        threads = [threading.Thread(target=write, args=(f"{number}",)) for number in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert [path.read_text()] == done
+        assert os.stat(path).st_mode & 0o777 == 0o600
+        assert list(tmp_path.iterdir()) == [path]
+        path.unlink()
+        done.clear()
+
+
+def test_a_new_file_does_not_follow_a_link_to_nowhere(tmp_path):
+    (tmp_path / "a").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(MtmError, match="exists already"):
+        write_new(tmp_path / "a", "text", mode=0o600)
+    assert not (tmp_path / "elsewhere").exists()

@@ -56,7 +56,8 @@ def test_an_existing_key_file_is_never_overwritten(written):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("format = 1", "format = 2", "key format 2"),
+        ("format = 1", "format = 2", "the kind is None"),
+        ("format = 1", "format = 3", "key format 3"),
         ("format = 1", "", "lacks|format None"),
         ("format = 1", "format = true", "key format True"),
         ('id = "fleet-7"', 'id = "fleet\\u0007"', "key id"),

@@ -78,6 +78,14 @@ def test_the_documented_parameters_are_those_there_are():
         assert f"`{name}` ({DEFAULTS[name]})" in PAGE
 
 
+def test_a_state_file_and_the_lab_s_clock_are_passed_on():
+    config = config_of(GIVEN | {"state": "r.state"}, "robot0")
+    assert (config.state.path, str(config.ledger_path)) == ("r.state", "r.state")
+    assert plan_of(GIVEN | {"allow_unsynchronised": True}).allow_unsynchronised
+    with pytest.raises(MtmError, match="true or false"):
+        plan_of(GIVEN | {"allow_unsynchronised": 1})
+
+
 def test_without_ros_the_node_says_what_to_source(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "rclpy", None)
     assert main([]) == 1

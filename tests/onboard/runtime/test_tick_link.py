@@ -53,6 +53,8 @@ class Noise:
 class Notes:
     """What a journal is told."""
 
+    hides_noise = False
+
     def __init__(self) -> None:
         self.rows: list[tuple[int, int]] = []
         self.events: list[tuple[int, str]] = []

@@ -16,7 +16,8 @@ from hil.vehicles.mavlink_vehicle import MavlinkVehicle
 from mtm_onboard.journal.journal import read_journal
 from mtm_onboard.links.mavlink_ports import UdpPort
 from mtm_onboard.model.velocity import STOP, BodyVelocity
-from mtm_onboard.protocol import Key, save_key
+from mtm_onboard.protocol import Key, load_key, save_key
+from mtm_onboard.protocol.journal_noise import with_noise
 from mtm_onboard.runtime.client import BaseCommandClient
 from mtm_onboard.runtime.guard import NOISE
 from tests.hil.vehicles.floating_plant import FloatingPlant
@@ -98,10 +99,10 @@ def test_our_program_drives_a_vehicle_through_a_router(start, tmp_path):
         run.signal(signal.SIGINT)
         assert run.end() == 0, run.output
         client.close()
-        record = read_journal(tmp_path / "r.csv")
+        record = with_noise(read_journal(tmp_path / "r.csv"), load_key(tmp_path / "r.key"))
         assert np.count_nonzero(record.flags & NOISE) > 150
         obeyed = np.array([velocity for _, velocity in plant.commands])
-        sent = record.sent[record.flags & NOISE > 0]
+        sent = record.sent[record.flags == NOISE]
         # What the vehicle obeyed is what was sent, in the wire's single precision, and in the end nothing.
         closest = np.min(np.linalg.norm(sent[-100:, None] - obeyed[None], axis=2), axis=1)
         assert np.mean(closest < 1e-5) > 0.95

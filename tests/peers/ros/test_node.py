@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from mtm_onboard.journal.journal import read_journal
-from mtm_onboard.protocol import Key, save_key
+from mtm_onboard.protocol import Key, load_key, save_key
 from mtm_onboard.protocol.framing import number_of_symbols
+from mtm_onboard.protocol.journal_noise import with_noise
 from mtm_onboard.runtime.guard import NOISE, STALE
 from mtm_onboard.runtime.modulator import Modulator
 from tests.onboard.schemes import FAKE_SECRET, small_codebook, small_scheme
@@ -76,7 +77,7 @@ def test_commands_of_either_reliability_get_the_message(start, tmp_path, reliabi
     driven = Node(start, tmp_path, "--reliability", reliability)
     driven.moving(300)
     assert driven.interrupt() == 0
-    record = read_journal(driven.journal_path)
+    record = with_noise(read_journal(driven.journal_path), load_key(tmp_path / "r.key"))
     noisy = record.flags & NOISE > 0
     first = int(np.argmax(noisy))
     assert np.mean(noisy[first:]) > 0.9
@@ -91,7 +92,7 @@ def test_another_middleware_drives_it_and_hears_it(start, tmp_path):
     driven.moving(200)
     driven.node.signal(signal.SIGINT)
     assert driven.node.end() == 0
-    record = read_journal(driven.journal_path)
+    record = with_noise(read_journal(driven.journal_path), load_key(tmp_path / "r.key"))
     noisy = record.flags & NOISE > 0
     assert np.mean(noisy[int(np.argmax(noisy)) :]) > 0.9
     sent = {tuple(np.round(row, 6)) for row in record.sent}

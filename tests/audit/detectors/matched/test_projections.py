@@ -1,5 +1,7 @@
 """What a window says of each tone, against the plain sums over its cells."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,8 @@ def prepared(seed=0, axes=2):
     rng = np.random.default_rng(seed)
     weights = rng.uniform(0.0, 1.4, (axes, COUNT))
     motion = Motion(10.0, STEP_S, rng.standard_normal((axes, COUNT)), np.ones(COUNT, dtype=bool))
-    return Prepared(motion, rng.standard_normal((axes, COUNT)), weights, np.array([1.0, -0.7, 0.3]))
+    filters = np.tile([1.0, -0.7, 0.3], (axes, 1))
+    return Prepared(motion, rng.standard_normal((axes, COUNT)), weights, np.ones(axes), filters)
 
 
 def places(*starts_s, groups=None):
@@ -67,8 +70,17 @@ def test_a_whole_window_s_cells_count_as_they_weigh():
     assert found.seen[0, 0] == pytest.approx(weights * found.cells)
 
 
+def test_a_quiet_axis_counts_as_much_more_as_its_interference_is_less():
+    """In units of one interference for all axes, with as much precision in all as the axes have."""
+    ready = prepared()
+    alike, unlike = project(ready, places(14.0)), project(replace(ready, scales=np.array([0.1, 0.2])), places(14.0))
+    share = np.array([2.0, 1.0]) / np.sqrt(2.5)
+    assert unlike.linear == pytest.approx(alike.linear * share[:, None])
+    assert unlike.power == pytest.approx(alike.power * share[:, None] ** 2)
+
+
 def test_a_plant_that_damps_a_tone_gives_it_less_power():
-    power = project(prepared(), places(14.0)).power
+    power = project(prepared(), places(14.0)).power[:, 0]
     quick, slow = 0, 1
     assert np.all(power[slow] < power[quick])
     assert (power[slow] / power[quick])[-1] < (power[slow] / power[quick])[0]

@@ -32,7 +32,7 @@ def noise_of(motion, seed=0):
     weights = rng.uniform(0.0, 1.4, motion.velocities.shape)
     weights[:, :3] = 0.0
     scales = rng.uniform(0.5, 2.0, len(motion.velocities))
-    return NoiseModel(np.array([1.0, -0.7, 0.3, 0.1]), (scales,), (weights,))
+    return NoiseModel((np.array([[1.0, -0.7, 0.3, 0.1], [1.0, 0.2, -0.1, 0.0]]),), (scales,), (weights,))
 
 
 def window_of(motion, number=0, onset_s=10.6, rate_hz=50.0):
@@ -63,7 +63,8 @@ def test_gains_are_those_of_weighted_least_squares(candidates):
     plant, candidate, axis = 5, candidates - 1, 1
     padded = np.zeros((2, 100))
     padded[:, window.first : window.last] = window.tones[candidate] @ rows[plant]
-    template, observed = whitened(padded, noise.filter), whitened(motion.velocities, noise.filter)
+    filters = noise.filters[0]
+    template, observed = whitened(padded, filters[axis]), whitened(motion.velocities, filters)
     inside = slice(window.first - noise.order, window.last - noise.order)
     root = np.sqrt(noise.weights[0][axis, noise.order :])
     scale = noise.scales[0][axis]
@@ -79,7 +80,7 @@ def test_the_planted_candidate_has_most_information():
     velocities = 1e-3 * motion.velocities
     mixing = np.array([[0.8, -0.6], [0.6, 0.8]])
     velocities[:, window.first : window.last] += mixing @ (window.tones[3] @ rows[4])
-    noise = NoiseModel(np.array([1.0, 0.0]), (np.ones(2),), (np.ones((2, 120)),))
+    noise = NoiseModel((np.array([[1.0, 0.0]] * 2),), (np.ones(2),), (np.ones((2, 120)),))
     found = statistics(window, window.tones, rows, noise, velocities)
     gains = np.linalg.solve(found.precision[:, 3, 4], found.information[:, 3, 4][..., None])[..., 0]
     assert gains == pytest.approx(mixing, abs=0.01)

@@ -7,11 +7,11 @@ from hil.experiments.verdicts.sure import FLEETS, PLANTS, decode_sent, summarise
 from mtm_onboard.protocol import MtmError
 
 
-def test_there_are_ten_plants_beside_the_calibrated_one():
-    assert len(PLANTS) == 11
+def test_there_are_eleven_plants_beside_the_calibrated_one():
+    assert len(PLANTS) == 12
 
 
-@pytest.mark.parametrize("plant", ["backlash", FLEETS])
+@pytest.mark.parametrize("plant", ["arm", FLEETS])
 def test_the_same_seed_gives_the_same_message_and_verdicts(plant):
     result = decode_sent({"plant": plant}, 3)
     assert result == decode_sent({"plant": plant}, 3)
@@ -37,7 +37,7 @@ def test_what_cannot_be_read_is_counted_as_refused(monkeypatch):
         raise MtmError("too short")
 
     monkeypatch.setattr(sure, "decode_at", refuses)
-    (summary, *_) = summarise_sure("backlash", [decode_sent({"plant": "backlash"}, 3)])
+    (summary, *_) = summarise_sure("arm", [decode_sent({"plant": "arm"}, 3)])
     assert (summary.refused, summary.absent, summary.wrong) == (1, 0, 0)
 
 
@@ -52,4 +52,4 @@ def test_messages_are_counted_by_verdict_at_each_threshold():
 
 
 def test_there_is_a_cell_for_each_message():
-    assert [cell.seed for cell in sure_cells("backlash", 3, 700_000)] == [700_000, 700_001, 700_002]
+    assert [cell.seed for cell in sure_cells("arm", 3, 700_000)] == [700_000, 700_001, 700_002]

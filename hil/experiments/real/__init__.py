@@ -1,0 +1,1 @@
+"""Messages added to recorded motion: what a decode makes of real interference."""

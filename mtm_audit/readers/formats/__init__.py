@@ -1,0 +1,1 @@
+"""One format of logs or motion capture per file: how it is recognised, and its poses."""

@@ -1,0 +1,1 @@
+"""What readers of logs and motion capture share: options, bodies with poses, tables of text, the list of formats."""

@@ -1,0 +1,91 @@
+"""What a verdict rests on beside its evidence: schedule, kind of key, when a day's key became public, revocations."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from mtm_audit.decoding.decoding import Decoding
+from mtm_onboard.protocol.holding import Grant
+
+FIXED = (
+    "The key's schedule is fixed: an old motion of these robots, or one put together from parts of several, would read "
+    "the same."
+)
+
+
+@dataclass(frozen=True)
+class Disclosure:
+    """Since when the disclosed key, by which a film is verified, may be public, and what says when the film is from.
+
+    `stated` when a person said so, else the file did; `written` is when this copy was last written.
+    """
+
+    public_from: datetime
+    stated: bool
+    written: datetime
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Sentences for the report, and whether what is read may be called authenticated when its tag holds."""
+
+    sentences: tuple[str, ...] = ()
+    authenticates: bool = True
+
+
+def basis_of(decoding: Decoding, grant: Grant | None, disclosure: Disclosure | None) -> Basis:
+    """What the verdict of a decoding rests on; nothing without a message."""
+    if decoding.verdict == "absent":
+        return Basis()
+    sentences, authenticates = [], True
+    if decoding.scheme.schedule == "fixed":
+        sentences.append(FIXED)
+    elif grant is not None and disclosure is None:
+        sentences.append(_holders(grant))
+    if disclosure is not None:
+        sentence, authenticates = _disclosed(disclosure)
+        sentences.append(sentence)
+    revoked = _revoked_channels(decoding)
+    if revoked:
+        authenticates = False
+        sentences.append(
+            f"Not authenticated: the key file of {', '.join(revoked)} was revoked by then, so whoever took it may have "
+            "made this motion."
+        )
+    return Basis(tuple(sentences), authenticates)
+
+
+def _holders(grant: Grant) -> str:
+    names = ", ".join(grant.channels)
+    return (
+        f"This motion can be made by who holds a file of its day: the robots of {names}, each its own channel, and "
+        "auditors of that day."
+    )
+
+
+def _disclosed(disclosure: Disclosure) -> tuple[str, bool]:
+    public = f"{disclosure.public_from:%Y-%m-%d %H:%M} UTC"
+    rests = (
+        f"Verified by a disclosed key, which may be public since {public}. A film made after that proves nothing: then "
+        "everybody could make this motion."
+    )
+    written = f"{disclosure.written.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
+    if disclosure.written < disclosure.public_from:
+        return f"{rests} This copy was last written on {written}, before that, by the file system's word.", True
+    if disclosure.stated:
+        return (
+            f"{rests} That the film was made before rests on --at alone: this copy was last written on {written}.",
+            True,
+        )
+    return (
+        f"{rests} Nothing but the file's own time says that it was made before, and whoever makes a file can set that; "
+        f"this copy was last written on {written}. So it proves nothing by itself.",
+        False,
+    )
+
+
+def _revoked_channels(decoding: Decoding) -> tuple[str, ...]:
+    """Channels of the scheme whose robot's file was revoked when the message was sent."""
+    at = decoding.settings.at
+    when_s = datetime.now(UTC).timestamp() if at is None else at.unix_s + at.error_s
+    names = {channel.name for channel in decoding.scheme.channels}
+    return tuple(name for name in decoding.settings.revoked.channels(when_s) if name in names)

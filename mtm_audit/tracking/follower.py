@@ -1,0 +1,169 @@
+"""Following markers from picture to picture, each copy of a marker by its continuity."""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from mtm_audit.model.picture import Frame, Image
+from mtm_audit.model.track import Floats, Track
+from mtm_audit.tracking.dictionaries import reads_in_a_mirror
+from mtm_audit.tracking.gather import Gather
+from mtm_audit.tracking.markers import MarkerFinder, Sighting
+
+FULL_SEARCH_EVERY_S = 0.5  # after which the whole picture is searched for markers that are new
+SEEN_AT_LEAST = 3  # frames; what is read less often is a chance reading of something else
+# For a marker out of sight the whole picture is searched in every frame at first, and then each time that it has been
+# so for a fifth longer.
+AT_ONCE_S, PATIENCE = 0.5, 0.2
+NEARBY_S = 1.0  # for which a marker out of sight is looked for around its last place in every frame
+BODY_SIDES = 3.0
+SIDES_PER_S = 15.0  # faster than any robot: 2.7 m/s with a marker of 18 cm
+_COPIES = "bcdefghijklmnopqrstuvwxyz"
+
+# A marker's number, and which of its copies: 0, 1 and so on in the order of their appearance.
+Copy = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """A copy of a marker as it was last seen, how far its corners had moved since before, and in how many frames."""
+
+    sighting: Sighting
+    step: Floats
+    seen_s: float
+    count: int
+
+    def expected(self, lost: bool) -> Floats:
+        """Its corners in the next frame, at constant velocity; one that is lost is where it was."""
+        return self.sighting.corners if lost else self.sighting.corners + self.step
+
+    def gap_sides(self, sighting: Sighting) -> float:
+        """How many of its sides it would have gone to be that one."""
+        return float(np.linalg.norm(sighting.centre - self.sighting.centre)) / self.sighting.side_px
+
+
+class MarkerFollower:
+    """Follows all markers in the pictures of one film, or in their mirror images."""
+
+    def __init__(self, dictionary: str, *, mirrored: bool) -> None:
+        self._dictionary, self._mirrored = dictionary, mirrored
+        self._finder = MarkerFinder(dictionary)
+        self._gather = Gather()
+        self._followed: dict[Copy, _Followed] = {}
+        self._places: dict[Copy, list[Floats]] = {}
+        self._searched_s = self._last_s = -np.inf
+        # Sightings by number of markers that cannot be read in a mirror, and of all markers.
+        self.decisive: Counter[int] = Counter()
+        self.sightings = 0
+
+    def look(self, frame: Frame) -> None:
+        """Find the markers of the next frame."""
+        self._gather.next_frame(frame)
+        image: Image = np.ascontiguousarray(frame.image[:, ::-1] if self._mirrored else frame.image)
+        found = self._nearby(image, frame.time_s)
+        if self._is_search_due(found, frame.time_s):
+            self._searched_s = frame.time_s
+            self._add_new(self._finder.everywhere(image), found, frame.time_s)
+        fine = self._finder.refined(image, list(found.values()))
+        for copy, sighting in zip(found, fine, strict=True):
+            self._note(copy, sighting, frame.time_s)
+        self._last_s = frame.time_s
+
+    def tracks(self) -> list[Track]:
+        """One track per marker that was seen often enough, named `marker<number>`.
+
+        Of copies that show at once the one that goes farthest has that name, the next `marker<number>b` and so on.
+        """
+        names = self._names()
+        seen = {copy: self._gather.seen[_key(copy)] for copy in names}
+        often = {copy: name for copy, name in names.items() if len(seen[copy]) >= SEEN_AT_LEAST}
+        self._gather.seen = {name: seen[copy] for copy, name in often.items()}
+        self._gather.extents_px = {name: self._gather.extents_px[_key(copy)] for copy, name in often.items()}
+        return self._gather.tracks(with_headings=True)
+
+    def _nearby(self, image: Image, time_s: float) -> dict[Copy, Sighting]:
+        """The followed markers that are where they are expected."""
+        found: dict[Copy, Sighting] = {}
+        for copy, last in self._followed.items():
+            if time_s - last.seen_s <= NEARBY_S or last.seen_s == self._last_s:
+                sighting = self._finder.near(image, copy[0], last.expected(lost=last.seen_s < self._last_s))
+                if sighting is not None and last.gap_sides(sighting) < self._reach_sides(last, time_s):
+                    found[copy] = sighting
+        return found
+
+    def _is_search_due(self, found: dict[Copy, Sighting], time_s: float) -> bool:
+        since_s = time_s - self._searched_s
+        if not self._followed or since_s >= FULL_SEARCH_EVERY_S:
+            return True
+        lost_s = [
+            time_s - last.seen_s
+            for copy, last in self._followed.items()
+            if copy not in found and last.count >= SEEN_AT_LEAST
+        ]
+        return any(since_s >= PATIENCE * (lost - AT_ONCE_S) for lost in lost_s)
+
+    def _add_new(self, sightings: list[Sighting], found: dict[Copy, Sighting], time_s: float) -> None:
+        """Give each sighting that is not among the `found` to the copy it continues, or make it a new one."""
+        for sighting in sightings:
+            if any(_is_there(one, sighting) for one in found.values()):
+                continue
+            copies = [copy for copy in self._followed | found if copy[0] == sighting.number]
+            unseen = [copy for copy in copies if copy not in found]
+            near = [
+                copy
+                for copy in unseen
+                if self._followed[copy].gap_sides(sighting) < self._reach_sides(self._followed[copy], time_s)
+            ]
+            if near:
+                found[min(near, key=lambda copy: self._followed[copy].gap_sides(sighting))] = sighting
+            elif len(copies) <= len(_COPIES):
+                found[sighting.number, len(copies)] = sighting
+
+    def _reach_sides(self, last: _Followed, time_s: float) -> float:
+        return 1.0 + SIDES_PER_S * (time_s - last.seen_s)
+
+    def _note(self, copy: Copy, sighting: Sighting, time_s: float) -> None:
+        column, row = sighting.centre
+        # A robot's body reaches beyond its marker, and its shadow beyond that.
+        extent_px = BODY_SIDES * sighting.side_px
+        self._gather.put(_key(copy), float(column), float(row), sighting.heading_rad, extent_px)
+        last = self._followed.get(copy)
+        is_next = last is not None and last.seen_s == self._last_s
+        step = sighting.corners - last.sighting.corners if last is not None and is_next else np.zeros((4, 2))
+        self._followed[copy] = _Followed(sighting, step, time_s, 1 + (last.count if last else 0))
+        self.sightings += 1
+        if not reads_in_a_mirror(self._dictionary, sighting.number):
+            self.decisive[sighting.number] += 1
+
+    def _names(self) -> dict[Copy, str]:
+        names: dict[Copy, str] = {}
+        for number in {number for number, _ in self._followed}:
+            self._join(number)
+            copies = [copy for copy in self._followed if copy[0] == number and _key(copy) in self._gather.seen]
+            copies.sort(key=self._reach_px, reverse=True)
+            names |= {copy: f"marker{number}{letter}" for copy, letter in zip(copies, ["", *_COPIES], strict=False)}
+        return names
+
+    def _join(self, number: int) -> None:
+        """Make copies one that never show in the same frame: a marker that leapt."""
+        seen = self._gather.seen
+        copies = [_key(copy) for copy in self._followed if copy[0] == number]
+        for place, later in enumerate(copies):
+            for earlier in copies[:place]:
+                if earlier in seen and not seen[earlier].keys() & seen[later].keys():
+                    seen[earlier] |= seen.pop(later)
+                    break
+
+    def _reach_px(self, copy: Copy) -> float:
+        places = np.array(list(self._gather.seen[_key(copy)].values()))[:, :2]
+        return float(np.ptp(places, axis=0).max())
+
+
+def _key(copy: Copy) -> str:
+    return f"{copy[0]}/{copy[1]}"
+
+
+def _is_there(one: Sighting, other: Sighting) -> bool:
+    apart_px = float(np.linalg.norm(one.centre - other.centre))
+    return one.number == other.number and apart_px < 0.5 * max(one.side_px, other.side_px)

@@ -1,0 +1,72 @@
+"""Taking the camera's own motion out of tracks: by markers that stand still, or else by the background."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+import numpy as np
+
+from mtm_audit.model.picture import Frame
+from mtm_audit.model.track import Track
+from mtm_audit.tracking.background import BackgroundFollower
+from mtm_audit.tracking.background_path import background_path
+from mtm_audit.tracking.camera_path import CameraPath
+from mtm_audit.tracking.gather import Progress
+from mtm_audit.tracking.reference import FOR_HOMOGRAPHY, chosen_tracks, reference_path, still_tracks
+from mtm_audit.tracking.registry import Tracker, is_flipped
+
+# What stands still for the background may move by so much of the camera's motion, or so many pixels.
+AGREEING, AGREEING_PX = 0.1, 0.3
+LEAST_WHOLE = 0.98  # of the frames must show enough of it
+
+
+def stabilised_tracks(
+    tracker: Tracker,
+    frames: Iterable[Frame],
+    reference: Sequence[str] = (),
+    warn: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
+) -> list[Track]:
+    """The tracker's tracks as a camera that stood still would have shown them; `warn` hears what was taken out.
+
+    `reference` names tracks that stand still. Without any, those that keep their distances are the reference when
+    there are enough of them, and otherwise what is behind the robots. The motion of a camera that moved by no more
+    than can be told is left alone. Raises MtmError as the tracker does, and when a reference does not exist.
+    """
+    seen = BackgroundFollower(is_needed=not reference)
+    tracks = tracker.track(_looked_at(frames, seen), progress)
+    if any(track.unit != "px" for track in tracks):
+        return tracks
+    path = _path(seen, tracks, reference, is_flipped(tracker))
+    if path is None or path.is_still(tracks):
+        return tracks
+    if warn is not None:
+        warn(f"the camera moved by {path.motion_px(tracks):.2g} px rms; that was taken out by {path.source}")
+    return [path.applied(track) for track in tracks]
+
+
+def _path(
+    seen: BackgroundFollower, tracks: Sequence[Track], reference: Sequence[str], flipped: bool
+) -> CameraPath | None:
+    if reference:
+        return reference_path(chosen_tracks(tracks, reference), seen.size)
+    background = background_path(seen, tracks, flipped)
+    if background is not None and background.is_still(tracks):
+        return background
+    still = still_tracks(tracks, seen.size)
+    if background is None:
+        return reference_path(still, seen.size) if still else None
+    agreeing_px = max(AGREEING * background.motion_px(tracks), AGREEING_PX)
+    agreeing = [track for track in still if _rms_px(background.applied(track)) < agreeing_px]
+    # A path that now and then rests on fewer things leaps whenever one comes or goes.
+    enough = np.sum([track.valid for track in agreeing], axis=0) >= FOR_HOMOGRAPHY
+    return reference_path(agreeing, seen.size) if np.mean(enough) > LEAST_WHOLE else background
+
+
+def _rms_px(track: Track) -> float:
+    seen = track.positions[track.valid]
+    return float(np.sqrt(np.mean(np.var(seen, axis=0)))) if len(seen) else np.inf
+
+
+def _looked_at(frames: Iterable[Frame], seen: BackgroundFollower) -> Iterator[Frame]:
+    for frame in frames:
+        seen.look(frame)
+        yield frame
