@@ -94,6 +94,13 @@ def test_a_recording_is_filmed_and_a_given_key_stays(tmp_path):
     assert (truth["message"], truth["onset_s"]) == (None, None)
 
 
+def test_a_film_can_be_that_of_a_surveillance_camera(tmp_path):
+    assert run(*QUICK, "--no-message", "--quality", "surveillance", "--out", tmp_path / "a") == 0
+    frames = list(read_frames(tmp_path / "a/video.mp4"))
+    assert len(frames) == 31
+    assert frames[-1].time_s == pytest.approx(2.0, abs=0.01)
+
+
 def test_two_recordings_of_one_seed_and_key_are_equal(tmp_path):
     run(*QUICK, "--message", 1, "--no-video", "--out", tmp_path / "a")
     for name in ("b", "c"):
