@@ -23,7 +23,7 @@ RANSAC_PX = 0.6
 LEAST_POINTS = 12
 LEAST_SHARE = 0.5  # of a key picture's points; with fewer in sight a new key picture is taken
 # A camera that was still for so long is looked at now and then, until it moves by so much.
-STILL_S, GLANCE_S, STILL_PX = 0.5, 0.1, 0.15
+STILL_S, GLANCE_S, STILL_PX = 0.3, 0.1, 0.15
 FEW = 20  # points that tell whether it does
 
 
