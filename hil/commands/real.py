@@ -150,8 +150,9 @@ def _summary(job: RealJob, cells: Sequence[Cell], results: Sequence[Values]) -> 
     others = "".join(f", {verdicts.count(v)} {v}" for v in ("inconclusive", "absent", "refused") if v in verdicts)
     said = (
         f"{name}: {decoded.successes} of {decoded.trials} messages on {recordings} recordings decoded at "
-        f"{job.threshold:g} [{low:.0f}-{high:.0f} %], {wrong} of them wrong{others}; likeliest symbol right {likeliest}, "
-        f"genie sure of it {sure}; evidence {bits[0]:.1f} to {bits[-1]:.1f} bits, median {np.median(bits):.1f}"
+        f"{job.threshold:g} [{low:.0f}-{high:.0f} %], {wrong} of them wrong{others}; likeliest symbol right "
+        f"{likeliest}, genie sure of it {sure}; evidence {bits[0]:.1f} to {bits[-1]:.1f} bits, median "
+        f"{np.median(bits):.1f}"
     )
     windows = sum(int(result["windows"]) for result in results)
     if not windows:
