@@ -72,7 +72,7 @@ def test_a_key_on_other_axes_than_the_robots_is_mentioned(tmp_path, capsys):
 def test_a_rolling_recording_says_when_it_was_made(tmp_path, capsys):
     key = tmp_path / "rolling.key"
     channels = [f"--channel=robot{number}:vx,vy:1:0.1" for number in range(4)]
-    keygen = ["--rate=50", "--band=0.5:5", "--alphabet=4", "--message-ticks=50", "--schedule=rolling", *channels]
+    keygen = ["--rate=50", "--band=0.5:5", "--alphabet=4", "--message-ticks=50", "--check=none", *channels]
     assert onboard(["keygen", "--id", "fake", "--name", "rolling", "--out", str(key), *keygen]) == 0
     assert run("record", "--seconds", "6", "--wire", "direct", "--message", 5, "--no-video", "--key", key,
                "--out", tmp_path / "a") == 0  # fmt: skip
