@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from hil.experiments.runs.cells import Cell, Scalar, Values
-from hil.plants.velocity_responses import Floats, lagged
+from hil.plants.responses import Floats, lag
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.recorded_at import RecordedAt
@@ -141,7 +141,7 @@ def _filmed(name: str, noise: Floats, draw: np.random.Generator) -> Track:
     )
     task = 0.3 * np.cos(2.0 * np.pi * (times_s[:, None] * draw.uniform(0.03, 0.1, 2) + draw.random(2)))
     slip = _SLIP_MPS * draw.standard_normal(played.shape)
-    velocities = lagged(played + task, _STEP_S, _LAG_S) + slip
+    velocities = lag(_STEP_S, _LAG_S).advance(played + task) + slip
     positions = np.cumsum(velocities, axis=0) * _STEP_S + _NOISE_M * draw.standard_normal(played.shape)
     return Track(name, times_s, positions, np.ones(len(times_s), dtype=np.bool_))
 

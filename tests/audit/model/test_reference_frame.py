@@ -79,7 +79,7 @@ def test_an_arm_has_neither_heading_nor_path():
     assert along_own_axes(glimpse, "path") is glimpse
 
 
-def test_missing_headings_are_bridged_and_mostly_missing_ones_not_used():
+def test_missing_headings_are_bridged_unless_most_are_missing():
     track = driven(np.full(2000, 0.5), np.zeros(2000), np.full(2000, 1.0))
     gapped, sparse = track.headings_rad.copy(), track.headings_rad.copy()
     gapped[500:600], sparse[:1200] = np.nan, np.nan

@@ -73,7 +73,7 @@ def test_over_keys_the_mean_is_one_whatever_was_learned(size):
     assert np.all(np.abs(values.mean(axis=1) - 1.0) < 5.0 * values.std(axis=1) / np.sqrt(values.shape[1]))
 
 
-def test_a_group_that_nobody_saw_teaches_nothing_and_has_no_evidence():
+def test_a_group_that_nobody_saw_teaches_nothing():
     rng = np.random.default_rng(4)
     sent = waveforms(rng, GROUPS)
     seen = observed(rng, sent, np.ones(TONES), 20.0)

@@ -40,7 +40,7 @@ def test_the_mean_over_keys_is_at_most_one(scheme):
     assert values.mean() <= 1.0 + 4.0 * values.std() / np.sqrt(len(values))
 
 
-def test_a_symbol_that_comes_again_adds_nothing_under_the_fixed_schedule():
+def test_a_symbol_that_comes_again_adds_nothing_if_fixed():
     """Its waveform has been used; taken for a new one it would count twice."""
     scores = np.tile(np.array([3.0, 2.0, 1.0, 0.0]), (6, 1))
     terms = terms_of(FIXED, Codebook(secret(1), FIXED), prepared(), 6, scores=scores)

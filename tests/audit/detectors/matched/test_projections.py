@@ -70,7 +70,7 @@ def test_a_whole_window_s_cells_count_as_they_weigh():
     assert found.seen[0, 0] == pytest.approx(weights * found.cells)
 
 
-def test_a_quiet_axis_counts_as_much_more_as_its_interference_is_less():
+def test_a_quiet_axis_counts_as_much_more_as_it_is_quieter():
     """In units of one interference for all axes, with as much precision in all as the axes have."""
     ready = prepared()
     alike, unlike = project(ready, places(14.0)), project(replace(ready, scales=np.array([0.1, 0.2])), places(14.0))
