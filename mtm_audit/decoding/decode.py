@@ -87,6 +87,7 @@ def _decoded(tracks: Sequence[Track], key: Key, settings: DecodeSettings, progre
         key_id=key.id,
         scheme=scheme,
         settings=settings,
+        frame=readings.frame,
     )
     return judged(weighed, settings.threshold)
 

@@ -9,6 +9,7 @@ from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.decoding.start import Start
 from mtm_audit.detectors.base import Reading
 from mtm_audit.model.glimpse import Glimpse
+from mtm_audit.model.reference_frame import ReferenceFrame
 from mtm_audit.model.track import Floats
 from mtm_audit.significance.evidence import Evidence
 from mtm_onboard.protocol.framing import Payload
@@ -59,7 +60,7 @@ class Decoding:
     is the number they spell, or the frame's payload, given only with the verdict "decoded". `order_known` is False when
     the message repeats and nothing shows which of its symbols comes first. `frames` are the framed messages found, in
     the order in which they were sent, `message` being the last; a single one that does not hold is the best guess.
-    `leaps` counts by track name the leaps that were taken out.
+    `leaps` counts by track name the leaps that were taken out. `frame` is the one along whose axes motion was read.
     """
 
     verdict: VerdictName
@@ -77,6 +78,7 @@ class Decoding:
     scheme: Scheme
     settings: DecodeSettings
     leaps: Mapping[str, int] = field(default_factory=dict)
+    frame: ReferenceFrame = "world"
 
     @property
     def uncertain(self) -> tuple[int, ...]:

@@ -36,12 +36,13 @@ def frames_of(channels: Sequence[Channel], glimpses: Iterable[Glimpse]) -> tuple
 
     The path shows the heading of robots that cannot move sideways: of channels with one planar axis.
     """
-    known = {frame for glimpse in glimpses for frame in known_frames(glimpse)}
+    seen = list(glimpses)
+    # What a robot's turning is seen by, its forward speed is seen along as well.
+    if any(_turning(channel) for channel in channels) and any(turning(glimpse, "body") for glimpse in seen):
+        return ("body",)
+    known = {frame for glimpse in seen for frame in known_frames(glimpse)}
     if any(len(_planar(channel)) > 1 for channel in channels):
         known.discard("path")
-    # A yaw rate needs a heading, and the axes that it turns with are the body's own.
-    if "body" in known and any(_turning(channel) for channel in channels):
-        known.discard("world")
     return tuple(frame for frame in REFERENCE_FRAMES if frame in known) or ("world",)
 
 

@@ -41,6 +41,7 @@ def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, .
         "key_id": decoding.key_id,
         "scheme": {"name": scheme.name, "fingerprint": scheme.fingerprint},
         "detector": decoding.settings.detector,
+        "reference_frame": decoding.frame,
         "channels": [_channel(channel) for channel in decoding.channels],
         "recording": {
             "paths": [str(path) for path in recording.paths],

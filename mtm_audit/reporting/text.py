@@ -104,6 +104,14 @@ def search_sentence(recording: Recording, decoding: Decoding) -> str | None:
     return f"Tracks matched by search {among}: {pairs}."
 
 
+def frame_sentence(decoding: Decoding) -> str | None:
+    """Along whose axes a message was read; None for the world's, and where nothing was read."""
+    if decoding.verdict == "absent" or decoding.frame == "world":
+        return None
+    headings = "as their paths show them" if decoding.frame == "path" else "as recorded"
+    return f"Read along the robots' own axes, by headings {headings}; trying that is paid for."
+
+
 def rarity(probability: float) -> str:
     """A probability as "43 in 100", "1 in 2,500" or "1 in 3e14"."""
     if probability >= 0.01:
@@ -126,6 +134,7 @@ def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str], b
                 *basis.sentences,
                 clock_sentence(decoding),
                 search_sentence(recording, decoding),
+                frame_sentence(decoding),
             )
             if sentence
         ),
