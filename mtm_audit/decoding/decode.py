@@ -11,6 +11,8 @@ from mtm_audit.decoding.decoding import ChannelDecoding, ChannelState, Decoding
 from mtm_audit.decoding.frames import Delivered, Heard, decode_frames
 from mtm_audit.decoding.leaps import without_leaps
 from mtm_audit.decoding.order import order_is_known
+from mtm_audit.decoding.paid import paid_for, worth
+from mtm_audit.decoding.pieces import Piece, pieces_of
 from mtm_audit.decoding.pooling import pooled_posteriors, pooled_symbols
 from mtm_audit.decoding.readings import Progress, Readings, read_tracks
 from mtm_audit.decoding.settings import DecodeSettings
@@ -20,6 +22,7 @@ from mtm_audit.detectors import make_detector
 from mtm_audit.model.stage import stage
 from mtm_audit.model.track import Floats, Track
 from mtm_audit.significance.evidence import needed_nats
+from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.scheme import Channel, Scheme
 
@@ -33,6 +36,7 @@ def decode_tracks(
 ) -> Decoding:
     """Decode a message from tracks under a key, whose leaps are taken out first.
 
+    A long recording is read in pieces (`pieces`), each of which may be the one with the message; that is paid for.
     Evidence by decoys that lies near the limit is judged anew by five times as many, since a tail known from few of
     them is taken for heavy. `progress(stage, fraction)` is called now and then. Raises MtmError when no channel can be
     read at all.
@@ -40,12 +44,58 @@ def decode_tracks(
     mended = [without_leaps(track) for track in tracks]
     tracks = [item.track for item in mended]
     leaps = {item.track.name: item.leaps for item in mended if item.leaps}
-    decoding = replace(_decoded(tracks, key, settings, progress), leaps=leaps)
+    with stage("timing"):
+        pieces = pieces_of(tracks, key.scheme, settings.onset_s)
+    if pieces:
+        return replace(_best_piece(pieces, key, settings, progress), leaps=leaps)
+    return replace(_judged_by_enough(tracks, key, settings, progress), leaps=leaps)
+
+
+def _best_piece(pieces: Sequence[Piece], key: Key, settings: DecodeSettings, progress: Progress | None) -> Decoding:
+    """The piece that shows most; framed messages of all that hold."""
+    found: list[Decoding] = []
+    refusal: MtmError | None = None
+    for number, piece in enumerate(pieces):
+        shown = None if progress is None else _part(progress, number, len(pieces))
+        try:
+            own = _judged_by_enough(piece.tracks, key, settings, shown) if piece.tracks else None
+        except MtmError as error:
+            refusal = refusal or error
+            continue
+        if own is not None:
+            found.append(replace(paid_for(own, piece.count), piece=(piece.begin_s, piece.end_s)))
+    if not found:
+        raise refusal or MtmError("no piece of the recording shows a track for long enough; film the robots for longer")
+    best = max(found, key=worth)
+    frames = [frame for each in found if each.verdict == "decoded" for frame in each.frames]
+    return replace(best, frames=_once(frames)) if frames else best
+
+
+def _once(frames: Sequence[Delivered]) -> tuple[Delivered, ...]:
+    """The frames in the order of time; those that two pieces show where they overlap once."""
+    kept: list[Delivered] = []
+    for frame in sorted(frames, key=lambda frame: frame.start_s):
+        if not kept or frame.message.payload != kept[-1].message.payload or frame.start_s >= kept[-1].end_s:
+            kept.append(frame)
+        else:
+            kept[-1] = replace(kept[-1], end_s=max(kept[-1].end_s, frame.end_s),
+                               slots=(kept[-1].slots[0], max(kept[-1].slots[1], frame.slots[1])))  # fmt: skip
+    return tuple(kept)
+
+
+def _part(progress: Progress, number: int, count: int) -> Progress:
+    return lambda stage, fraction: progress(f"piece {number + 1} of {count}: {stage}", (number + fraction) / count)
+
+
+def _judged_by_enough(
+    tracks: Sequence[Track], key: Key, settings: DecodeSettings, progress: Progress | None
+) -> Decoding:
+    decoding = _decoded(tracks, key, settings, progress)
     by_decoys = decoding.evidence.nats is None
     if not by_decoys or not settings.threshold < decoding.evidence.p_value <= NEARLY:
         return decoding
     more = replace(settings, decoys=MORE_DECOYS * settings.decoy_count)
-    return replace(_decoded(tracks, key, more, progress), leaps=leaps)
+    return _decoded(tracks, key, more, progress)
 
 
 def _decoded(tracks: Sequence[Track], key: Key, settings: DecodeSettings, progress: Progress | None) -> Decoding:

@@ -60,7 +60,8 @@ class Decoding:
     is the number they spell, or the frame's payload, given only with the verdict "decoded". `order_known` is False when
     the message repeats and nothing shows which of its symbols comes first. `frames` are the framed messages found, in
     the order in which they were sent, `message` being the last; a single one that does not hold is the best guess.
-    `leaps` counts by track name the leaps that were taken out. `frame` is the one along whose axes motion was read.
+    `leaps` counts by track name the leaps that were taken out. `frame` is the one along whose axes motion was read,
+    and `piece` (begin, end) the part of a long recording that was, None for all of it.
     """
 
     verdict: VerdictName
@@ -79,6 +80,7 @@ class Decoding:
     settings: DecodeSettings
     leaps: Mapping[str, int] = field(default_factory=dict)
     frame: ReferenceFrame = "world"
+    piece: tuple[float, float] | None = None
 
     @property
     def uncertain(self) -> tuple[int, ...]:

@@ -6,11 +6,10 @@ from dataclasses import replace
 
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.decoding import Decoding
+from mtm_audit.decoding.paid import paid_for, worth
 from mtm_audit.decoding.readings import Progress
 from mtm_audit.decoding.settings import DecodeSettings
-from mtm_audit.decoding.verdict import judged
 from mtm_audit.model.track import Track
-from mtm_audit.significance.decoys import DecoyComparison
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key
 
@@ -66,43 +65,13 @@ def decode_at_speeds(
             refusal = refusal or error
             continue
         paid = paid_for(found, len(speeds))
-        if best is None or _worth(paid) > _worth(best[1]):
+        if best is None or worth(paid) > worth(best[1]):
             best = speed, paid
         if paid.verdict == "decoded":
             return speed, paid
     if best is None:
         raise refusal or MtmError("there is no speed to try; name at least one")
     return best
-
-
-def paid_for(decoding: Decoding, choices: int) -> Decoding:
-    """The decoding as one of so many that were tried: its verdict, its evidence and the sureness of its symbols."""
-    cost = math.log(choices)
-    evidence = decoding.evidence
-    paid = replace(
-        evidence,
-        nats=_less(evidence.nats, cost),
-        decoys=None if evidence.decoys is None else _dearer(evidence.decoys, choices),
-    )
-    frames = tuple(
-        replace(frame, message=replace(frame.message, tried=choices * frame.message.tried)) for frame in decoding.frames
-    )
-    channels = tuple(replace(channel, nats=_less(channel.nats, cost)) for channel in decoding.channels)
-    symbols = tuple(_less(nats, cost) for nats in decoding.symbol_nats)
-    whole = replace(decoding, evidence=paid, symbol_nats=symbols, frames=frames, channels=channels)
-    return judged(whole, decoding.settings.threshold)
-
-
-def _less(nats: float | None, cost: float) -> float | None:
-    return None if nats is None else nats - cost
-
-
-def _dearer(comparison: DecoyComparison, choices: int) -> DecoyComparison:
-    return replace(comparison, p_value=min(1.0, choices * comparison.p_value))
-
-
-def _worth(decoding: Decoding) -> tuple[bool, float]:
-    return decoding.verdict != "absent", decoding.evidence.bits
 
 
 def _begin_s(tracks: Sequence[Track]) -> float:

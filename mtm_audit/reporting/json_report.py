@@ -49,6 +49,7 @@ def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, .
             "duration_s": recording.duration_s,
             "frames": recording.frames,
             "speed": recording.speed,
+            "piece_s": None if decoding.piece is None else list(decoding.piece),
         },
         "rests_on": list(basis.sentences),
         "late_s": late_s(decoding),

@@ -112,6 +112,16 @@ def frame_sentence(decoding: Decoding) -> str | None:
     return f"Read along the robots' own axes, by headings {headings}; trying that is paid for."
 
 
+def piece_sentence(decoding: Decoding) -> str | None:
+    """Which piece of a long recording shows the message; None for a recording that was read as a whole."""
+    if decoding.piece is None:
+        return None
+    if decoding.verdict == "absent":
+        return "The recording was read in pieces, since it is long; none of them shows a message."
+    begin_s, end_s = decoding.piece
+    return f"Read in pieces, since the recording is long; this is what {begin_s:.0f} s to {end_s:.0f} s show."
+
+
 def rarity(probability: float) -> str:
     """A probability as "43 in 100", "1 in 2,500" or "1 in 3e14"."""
     if probability >= 0.01:
@@ -135,6 +145,7 @@ def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str], b
                 clock_sentence(decoding),
                 search_sentence(recording, decoding),
                 frame_sentence(decoding),
+                piece_sentence(decoding),
             )
             if sentence
         ),

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.decoding.paid import paid_for
 from mtm_audit.decoding.settings import DecodeSettings
-from mtm_audit.decoding.speeds import SPEEDS, at_speed, decode_at_speeds, paid_for, played
+from mtm_audit.decoding.speeds import SPEEDS, at_speed, decode_at_speeds, played
 from mtm_onboard.protocol import MtmError
 from tests.audit.moving_robot import OTHER_SECRET, key_of, robot_track, scheme_of
 
@@ -92,8 +93,8 @@ def test_the_search_finds_nothing_for_a_key_that_had_no_part(tracks):
 
 
 def test_what_no_speed_can_read_is_refused_for_its_reason(tracks):
-    with pytest.raises(MtmError, match="no more than 10000 s can be searched"):
-        decode_at_speeds(slowed(tracks, 1e5), KEY, SETTINGS)
+    with pytest.raises(MtmError, match="no more than 86400 s can be searched"):
+        decode_at_speeds(slowed(tracks, 1e6), KEY, SETTINGS)
 
 
 def test_the_speeds_reach_from_an_eighth_to_eight():
