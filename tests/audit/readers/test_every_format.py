@@ -71,7 +71,7 @@ def test_a_message_decodes_alike_from_every_format(tmp_path, message, name):
 
 @pytest.fixture(scope="module")
 def rolling():
-    """A key whose waveforms change with time, and a robot that says 3 from the recording's start, where a slot begins."""
+    """A key whose waveforms change with time, and a robot that says 3 in the slot that begins the recording."""
     key = key_of(scheme_of(symbols=(1,), ticks=400, schedule="rolling"))
     first = slot_at(UNIX_S, key.scheme)
     assert slot_start_unix_s(first, key.scheme) == UNIX_S
