@@ -21,6 +21,7 @@ _COMMANDS = (
     "mtm_onboard.commands.status",
     "mtm_onboard.commands.stop",
     "mtm_onboard.commands.export",
+    "mtm_onboard.commands.device_key",
 )
 
 

@@ -50,7 +50,7 @@ typedef struct {
  *   48 24  per axis vx, vy, wz: step u32, limit u32. One unit of a sample is step * 2^-36 m/s or rad/s, so the noise
  *          is round(sample * step / 2^16) in 2^-20; step is 1 to 2^30, 0 when the axis has no samples. The limit
  *          is the largest magnitude of that axis' command with noise, in 2^-20, 1 to 2^30.
- *   72 16  tag: keyed, checked by whoever provisioned the image. A device without the secret cannot check it.
+ *   72 16  tag: keyed, checked by whoever provisioned the image. The device has no key for it; see the seal.
  *   88     samples, int16: all ticks of the first axis that has samples, then of the next
  *  end-4   CRC-32 (polynomial 0xEDB88320 reflected, start and final exclusive-or 0xFFFFFFFF) of all bytes before it.
  *          This is what the device checks: it finds accidents, not forgeries.
@@ -58,6 +58,26 @@ typedef struct {
 #define MTM_IMAGE_VERSION 1
 #define MTM_IMAGE_HEADER_BYTES 88
 #define MTM_IMAGE_CRC_BYTES 4
+
+/* A sealed image is an image behind a seal, for a device that has a key of its own, which is not the fleet's:
+ *
+ *    0  4  "MTMS"
+ *    4  2  format version of the seal, 1
+ *    6  2  0
+ *    8  4  size of seal and image
+ *   12  4  channel of the device
+ *   16  4  counter: higher for each image that is made for a device
+ *   20 12  vx, vy, wz: largest magnitude of the noise in 2^-20, 0 to 2^30; what the samples exceed is cut
+ *   32 16  tag: the first bytes of SHAKE-256(device key, 32 bytes || 4 || "seal" || bytes 0 to 31 || image)
+ *   48     the image
+ *
+ * What a device cannot check: without mtm_shim_trust, who made an image, for whom and when; without storage for
+ * `counter`, after its power was cut, whether it has played an image before; and never, whether the time is that of the
+ * image's slots. */
+#define MTM_SEAL_VERSION 1
+#define MTM_SEAL_BYTES 48
+#define MTM_SEAL_TAG_AT 32
+#define MTM_DEVICE_KEY_BYTES 32
 
 typedef enum {
     MTM_OK = 0,
@@ -69,7 +89,11 @@ typedef enum {
     MTM_IMAGE_CORRUPT = 6,   /* CRC-32 does not match */
     MTM_IMAGE_WRONG_RATE = 7, /* made for another rate than settings.rate_mhz */
     MTM_IMAGE_INVALID = 8,   /* a field is outside its range */
-    MTM_IMAGE_BUSY = 9       /* the image that would be replaced waits for its turn already */
+    MTM_IMAGE_BUSY = 9,      /* the image that would be replaced waits for its turn already */
+    MTM_IMAGE_UNSEALED = 10, /* the device trusts sealed images alone */
+    MTM_IMAGE_FORGED = 11,   /* the seal is not one of the device's key, or something behind it was altered */
+    MTM_IMAGE_OTHER_CHANNEL = 12, /* sealed for another device */
+    MTM_IMAGE_OLD = 13       /* its counter is not above that of the last image that was taken */
 } mtm_result;
 
 /* A checked image. Fields are for reading. */
@@ -78,6 +102,7 @@ typedef struct {
     uint32_t ticks;       /* of all messages together */
     uint32_t step[MTM_AXES];
     mtm_q20 limit[MTM_AXES];
+    mtm_q20 noise_limit[MTM_AXES];
     uint32_t offset[MTM_AXES]; /* of the axis' first sample in bytes; 0: no samples */
     uint8_t repeats;
 } mtm_image;
@@ -120,13 +145,20 @@ typedef struct {
     uint32_t age_us;    /* of the last good command; stays at its largest value */
     mtm_q20 limit[MTM_AXES];
     mtm_velocity base;  /* last good command, limited */
-    uint8_t started, stopped;
+    uint32_t channel, counter; /* see mtm_shim_trust */
+    uint8_t device_key[MTM_DEVICE_KEY_BYTES];
+    uint8_t started, stopped, trusts;
 } mtm_shim;
 
 /* Set everything to rest: no image, no command, output zero. MTM_BAD_SETTINGS leaves `shim` untouched. */
 mtm_result mtm_shim_init(mtm_shim *shim, const mtm_settings *settings);
 
-/* Hand over an image. It is checked here and refused before anything of it plays. With nothing playing it begins at
+/* From now on take images only that are sealed with this key of 32 bytes for this channel, with a counter above the
+ * given one. `shim->counter` is that of the last image taken: a board with storage keeps it, and gives it here when it
+ * starts. Without this call every image is taken whose checksum is right, sealed or not. */
+void mtm_shim_trust(mtm_shim *shim, const uint8_t *device_key, uint32_t channel, uint32_t counter);
+
+/* Hand over an image, sealed or not. It is checked here and refused before anything of it plays. With nothing playing it begins at
  * the next tick; otherwise at the message boundary where the active image ends; a repeating one ends each time it has
  * played. The bytes must stay unchanged while `active.bytes` or `pending.bytes` points to them, so a board with two
  * buffers fills the one that is neither. A third image is MTM_IMAGE_BUSY. */

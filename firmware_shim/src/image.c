@@ -53,6 +53,7 @@ static uint32_t read_axes(mtm_image *image, const uint8_t *bytes)
         }
         image->step[axis] = step;
         image->limit[axis] = (mtm_q20)limit;
+        image->noise_limit[axis] = MTM_Q20_MAX;
         image->offset[axis] = present ? MTM_IMAGE_HEADER_BYTES + 2 * used * image->ticks : 0;
         used += present;
     }

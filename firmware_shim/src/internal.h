@@ -11,6 +11,9 @@ void mtm_clear(void *object, uint32_t size);
 uint16_t mtm_u16(const uint8_t *bytes);
 uint32_t mtm_u32(const uint8_t *bytes);
 
+/* seal.c: as mtm_image_check, for a sealed image. */
+mtm_result mtm_seal_check(mtm_image *image, const uint8_t *bytes, uint32_t size, const mtm_shim *shim);
+
 /* guard.c */
 void mtm_count(uint32_t *counter);
 mtm_q20 mtm_limited(mtm_q20 value, mtm_q20 limit, uint32_t *clamps);

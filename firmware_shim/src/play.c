@@ -27,7 +27,17 @@ mtm_result mtm_shim_offer(mtm_shim *shim, const uint8_t *bytes, uint32_t size)
 {
     mtm_result result = MTM_IMAGE_BUSY;
     if (shim->pending.bytes == NULL) {
-        result = mtm_image_check(&shim->pending, bytes, size, shim->settings.image_bytes_max, shim->settings.rate_mhz);
+        if (bytes != NULL && size >= 4 && mtm_u32(bytes) == 0x534D544Du) {
+            result = mtm_seal_check(&shim->pending, bytes, size, shim);
+            if (result == MTM_OK) {
+                shim->counter = mtm_u32(bytes + 16);
+            }
+        } else if (shim->trusts) {
+            result = MTM_IMAGE_UNSEALED;
+        } else {
+            result =
+                mtm_image_check(&shim->pending, bytes, size, shim->settings.image_bytes_max, shim->settings.rate_mhz);
+        }
     }
     if (result != MTM_OK) {
         mtm_count(&shim->counts.refused_images);
@@ -125,6 +135,9 @@ mtm_q20 mtm_noise(const mtm_shim *shim, uint32_t axis)
     sample = mtm_u16(image->bytes + image->offset[axis] + 2 * shim->position);
     size = sample & 0x8000u ? 0x10000u - sample : sample;
     size = (uint32_t)(((uint64_t)size * image->step[axis] + 0x8000u) >> 16); /* 2^29 at most */
+    if (size > (uint32_t)image->noise_limit[axis]) {
+        size = (uint32_t)image->noise_limit[axis];
+    }
     return sample & 0x8000u ? -(mtm_q20)size : (mtm_q20)size;
 }
 

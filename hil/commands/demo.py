@@ -53,7 +53,8 @@ def demo(out: Path, console: Console) -> bool:
     with new_folder(out) as folder:
         print(f"in {out}, with the programs that a user would call:")
         _run_all(
-            folder, [f"mtm-onboard keygen --preset robomaster-fleet --id {name} --out {name}.key" for name in _KEYS]
+            folder,
+            [f"mtm-onboard keygen --preset paper-robomaster-fleet --id {name} --out {name}.key" for name in _KEYS],
         )
         _run_all(folder, _RECORDINGS)
         answers = _decode_all(folder)

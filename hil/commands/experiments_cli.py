@@ -297,6 +297,24 @@ def fuzz(
             raise typer.Exit(1)
 
 
+def forgeries(
+    tries: Annotated[int, typer.Option("-n", min=1, help="Tries, over all attacks.")] = 10_000,
+    seed: CellSeed = 0,
+    workers: Workers = None,
+    out: OutCsv = None,
+    cells: Cells = CELLS_FOLDER / "forgeries.jsonl",
+) -> None:
+    """Forge messages of keys as they are made by default: splices, journals, learnt codebooks, replays, relays.
+
+    Stop it at any time: what is finished is kept, and the next run goes on. About 3 s a try and core.
+    """
+    with reported_console() as console:
+        from hil.commands.forgeries import forgeries as run
+
+        if not run(tries, seed, workers, out, cells, console):
+            raise typer.Exit(1)
+
+
 def endurance(
     hours: Annotated[float, typer.Option(min=0.0, help="Simulated hours.")] = 24.0,
     checkpoints: Annotated[int, typer.Option(min=1, help="Number of checkpoints, evenly spaced up to the end.")] = 24,
@@ -313,5 +331,5 @@ def endurance(
 # In the order in which --help lists them.
 EXPERIMENTS: tuple[Callable[..., None], ...] = (
     calibrate, bench, cameras, false_alarms, messages, frames, shim, robustness, sweep, real, identify, faults, fuzz,
-    endurance,
+    forgeries, endurance,
 )  # fmt: skip

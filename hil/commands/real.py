@@ -21,6 +21,7 @@ from mtm_onboard.protocol import MtmError
 _COLUMNS = (
     "recording", "frame", "sigma", "seed", "symbol", "start_s", "onset_s", "delay_s", "natural_hz", "damping", "gain",
     "rate_scale", "verdict", "likeliest_right", "bits", "windows", "matched", "coherency", "genie",
+    "genie_sure",
 )  # fmt: skip
 
 
@@ -142,6 +143,7 @@ def _summary(job: RealJob, cells: Sequence[Cell], results: Sequence[Values]) -> 
     wrong = sum(result["verdict"] == "decoded" and not result["likeliest_right"] for result in results)
     likeliest = sum(bool(result["likeliest_right"]) for result in results)
     bits = np.sort([float(result["bits"]) for result in results])
+    sure = sum(bool(result["genie_sure"]) for result in results)
     recordings = len({cell.parameters["path"] for cell in cells})
     decoded = Proportion(verdicts.count("decoded"), len(results))
     low, high = decoded.interval_percent
@@ -149,7 +151,8 @@ def _summary(job: RealJob, cells: Sequence[Cell], results: Sequence[Values]) -> 
     said = (
         f"{name}: {decoded.successes} of {decoded.trials} messages on {recordings} recordings decoded at "
         f"{job.threshold:g} [{low:.0f}-{high:.0f} %], {wrong} of them wrong{others}; likeliest symbol right "
-        f"{likeliest}; evidence {bits[0]:.1f} to {bits[-1]:.1f} bits, median {np.median(bits):.1f}"
+        f"{likeliest}, genie sure of it {sure}; evidence {bits[0]:.1f} to {bits[-1]:.1f} bits, median "
+        f"{np.median(bits):.1f}"
     )
     windows = sum(int(result["windows"]) for result in results)
     if not windows:

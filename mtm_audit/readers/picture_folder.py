@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -91,7 +92,10 @@ def _image(path: Path, pixels: Pixels) -> Image:
     except OSError as error:
         raise MtmError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
     flags = cv2.IMREAD_GRAYSCALE if pixels == "gray" else cv2.IMREAD_COLOR
-    image = cv2.imdecode(content, flags) if len(content) else None
+    image = None
+    # A header that announces more than can be held is an error, and any other damage gives nothing.
+    with suppress(cv2.error):
+        image = cv2.imdecode(content, flags) if len(content) else None
     if image is None:
         raise MtmError(f"{path} is no picture that can be read; copy it again or remove it")
     return np.asarray(image, dtype=np.uint8)

@@ -8,7 +8,7 @@ from scipy.special import logsumexp
 
 from mtm_audit.detectors.base import ChannelReading
 from mtm_audit.detectors.matched.correlate import Prepared, stacked_tones
-from mtm_audit.detectors.matched.plants import Plants, joined, plant_family, returning
+from mtm_audit.detectors.matched.plants import Plants, joined, plant_family, returning, second_order
 from mtm_audit.detectors.matched.projections import Places, Projections, project
 from mtm_audit.model.timing import Onset, Timing
 from mtm_audit.model.track import Floats
@@ -24,6 +24,7 @@ Integers = NDArray[np.int64]
 SHAPES: Plants = joined(
     plant_family(np.array([0.0]), np.array([0.04, 0.1, 0.2, 0.4])),
     returning(plant_family(np.array([0.0]), np.array([0.06, 0.2])), (0.1, 0.3)),
+    second_order((1.3, 2.2, 3.5), 0.7),
 )
 # To choose timings and plants every fourth loudness will do, 12 dB apart.
 _COARSE = slice(1, None, 4)

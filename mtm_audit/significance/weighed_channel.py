@@ -20,8 +20,8 @@ Integers = NDArray[np.int64]
 TableOf = Callable[[Terms], Floats]
 Said = Callable[[TableOf], Floats]
 
-_PAIRS = 6
-_HYPOTHESES = 32
+_PAIRS = 12
+_HYPOTHESES = 64
 
 
 @dataclass(frozen=True)

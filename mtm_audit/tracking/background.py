@@ -5,7 +5,7 @@ do not add up from picture to picture, and a turn or a change of scale leaves th
 apart afterwards, when the tracks are known.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -23,7 +23,8 @@ RANSAC_PX = 0.6
 LEAST_POINTS = 12
 LEAST_SHARE = 0.5  # of a key picture's points; with fewer in sight a new key picture is taken
 # A camera that was still for so long is looked at now and then, until it moves by so much.
-STILL_S, GLANCE_S, STILL_PX = 1.0, 0.1, 0.15
+STILL_S, GLANCE_S, STILL_PX = 0.3, 0.1, 0.15
+FEW = 20  # points that tell whether it does
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,10 @@ class BackgroundFollower:
         is_still = self._looked_s - self._moved_s > STILL_S
         if is_still and frame.time_s - self._looked_s < GLANCE_S:
             return
+        if is_still and frame.image.ndim == 2 and self._is_where_it_was(frame.image):
+            self._looked_s = frame.time_s
+            self.looks.append(replace(self.looks[-1], row=len(self.times_s) - 1))
+            return
         image = frame.image if frame.image.ndim == 2 else cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY)
         image = np.asarray(image, dtype=np.uint8)
         coarse = _coarse(image)
@@ -76,6 +81,14 @@ class BackgroundFollower:
         else:
             self._find(image, coarse, frame.time_s)
         self._coarse, self._looked_s = coarse, frame.time_s
+
+    def _is_where_it_was(self, image: Image) -> bool:
+        """Whether a few points lie where they were when the camera last moved."""
+        some = Key(0, self.keys[-1].image, self.keys[-1].points[:: len(self.keys[-1].points) // FEW or 1], np.eye(3))
+        places = _places(some, image, self._motion)
+        off_px = np.linalg.norm(places - cv2.perspectiveTransform(some.points[None], self._motion)[0], axis=1)
+        off_px = off_px[np.isfinite(off_px)]
+        return len(off_px) >= FEW // 2 and float(np.median(off_px)) < STILL_PX
 
     def _take_key(self, image: Image, to_first: Floats, time_s: float) -> None:
         self.keys.append(Key(len(self.times_s) - 1, image.copy(), _good_points(image), to_first))
@@ -173,24 +186,21 @@ def _places(key: Key, image: Image, expected: Floats) -> NDArray[np.float32]:
     inside = np.flatnonzero(np.all((corners >= 0) & (corners + PATCH_PX <= np.array(image.shape[::-1])), axis=1))
     if not len(inside):
         return places
-    # All patches side by side in one picture, so that one call finds them all.
-    across = int(np.ceil(np.sqrt(len(inside))))
-    origins = PATCH_PX * np.stack([np.arange(len(inside)) % across, np.arange(len(inside)) // across], axis=1)
-    side = PATCH_PX * across
-    now = np.zeros((PATCH_PX * int(np.ceil(len(inside) / across)), side), np.uint8)
-    own = np.zeros((*now.shape, 2), np.float32)
+    # All patches below one another in one picture, so that one call finds them all.
+    corners = corners[inside]
+    patches = np.lib.stride_tricks.sliding_window_view(image, (PATCH_PX, PATCH_PX))[corners[:, 1], corners[:, 0]]
     grid = np.stack(np.meshgrid(np.arange(PATCH_PX), np.arange(PATCH_PX)), axis=-1)
-    for (x, y), (left, upper) in zip(origins, corners[inside], strict=True):
-        now[y : y + PATCH_PX, x : x + PATCH_PX] = image[upper : upper + PATCH_PX, left : left + PATCH_PX]
-        own[y : y + PATCH_PX, x : x + PATCH_PX] = grid + np.array([left, upper])
+    own = (corners[:, None, None] + grid).astype(np.float32).reshape(-1, PATCH_PX, 2)
     maps = cv2.perspectiveTransform(own, np.linalg.inv(expected))
     before = cv2.remap(key.image, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    start = (guesses[inside] - corners[inside] + origins).astype(np.float32)
+    now = patches.reshape(-1, PATCH_PX)
+    shifts = np.stack([-corners[:, 0], PATCH_PX * np.arange(len(inside)) - corners[:, 1]], axis=1)
+    start = (guesses[inside] + shifts).astype(np.float32)
     found, status, _ = cv2.calcOpticalFlowPyrLK(
         before, now, start, start.copy(), winSize=(WINDOW_PX, WINDOW_PX), maxLevel=LEVELS
     )
     good = (status.ravel() == 1) & (np.abs(found - start).max(axis=1) < PATCH_PX / 4)
-    places[inside[good]] = (found - origins + corners[inside])[good]
+    places[inside[good]] = (found - shifts)[good]
     return places
 
 

@@ -13,7 +13,8 @@ MIDDLES = (STEPS[:-1] + STEPS[1:]) / 2
 # A profile reaches half of the dark border on one side and as far into the white margin on the other.
 REACH_CELLS = 0.55
 LEAST_REACH_PX, MOST_REACH_PX = 1.6, 5.0
-PASSES = 2
+SURE_PX = 0.4
+BEFORE, AFTER = [3, 0, 1, 2], [1, 2, 3, 0]
 LEAST_CONTRAST = 12.0  # in gray levels, of a side against its margin
 FARTHEST_PX = 0.5  # of a profile's edge from its side's line; farther off something lies over the side
 
@@ -25,24 +26,27 @@ def refined_corners(image: Image, corners: Floats, cells: int) -> Floats:
     many cells a side has, the border's two among them. Each profile across a side puts the edge where its gradient has
     its centroid, which is as good between pixels as on them; contours of whole pixels are not.
     """
-    sides_px = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).min(axis=1)
+    sides_px = np.sqrt(np.sum((corners - corners[:, BEFORE]) ** 2, axis=2)).min(axis=1)
     reach_px = np.clip(REACH_CELLS * sides_px / cells, LEAST_REACH_PX, MOST_REACH_PX)
-    found = corners
-    for _ in range(PASSES):
-        found = _once(image, found, reach_px)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = _once(image, corners, reach_px)
+        # An edge far from the middle of its profiles is not measured quite right.
+        again = np.abs(found - corners).max(axis=(1, 2)) > SURE_PX
+        if again.any():
+            found[again] = _once(image, found[again], reach_px[again])
     astray = ~(np.abs(found - corners).max(axis=(1, 2)) < MOST_REACH_PX)
     return np.where(astray[:, None, None], np.nan, found)
 
 
 def _once(image: Image, corners: Floats, reach_px: Floats) -> Floats:
-    sides = np.roll(corners, -1, axis=1) - corners
-    along = sides / np.linalg.norm(sides, axis=2, keepdims=True)
+    sides = corners[:, AFTER] - corners
+    along = sides / np.sqrt(np.sum(sides**2, axis=2, keepdims=True))
     outward = np.stack([along[..., 1], -along[..., 0]], axis=2)
     feet = corners[:, :, None] + SIDE_SHARE[:, None] * sides[:, :, None]
     across = (STEPS * reach_px[:, None])[:, None, :, None] * outward[:, :, None]
     gradients = np.maximum(np.diff(_sampled(image, feet[:, :, :, None] + across[:, :, None]), axis=3), 0.0)
     contrasts = gradients.sum(axis=3)
-    usual = np.median(contrasts.reshape(len(corners), -1), axis=1)
+    usual = contrasts.mean(axis=(1, 2))
     good = contrasts > np.maximum(LEAST_CONTRAST, 0.4 * usual)[:, None, None]
     edges_px = reach_px[:, None, None] * (gradients @ MIDDLES) / np.maximum(contrasts, 1e-9)
     lines = _fitted(edges_px, good)
@@ -85,7 +89,7 @@ def _fitted(edges_px: Floats, good: Bools) -> Floats:
 
 def _crossings(starts: Floats, along: Floats) -> Floats:
     """Where each side's line meets that of the side before it, (n, 4, 2)."""
-    before, before_along = np.roll(starts, 1, axis=1), np.roll(along, 1, axis=1)
+    before, before_along = starts[:, BEFORE], along[:, BEFORE]
     apart = starts - before
     turn = before_along[..., 0] * along[..., 1] - before_along[..., 1] * along[..., 0]
     share = (apart[..., 0] * along[..., 1] - apart[..., 1] * along[..., 0]) / turn

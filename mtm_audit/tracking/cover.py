@@ -25,8 +25,9 @@ LEAST_CHROMA = 20.0
 # Largest hue, saturation and value in OpenCV's HSV of eight bits, whose hues are steps of two degrees.
 LARGEST_HSV = (180, 255, 255)
 COVERED = 0.35  # the least cover of a pixel that belongs to a patch
-# What a drifting colour is learnt from: pixels that it covers, pixels that it does not, and at least so many of each.
-FULLY_COVERED, HARDLY_COVERED, LEAST_LEARNT_PX = 0.6, 0.1, 12
+# What a drifting colour is learnt from: pixels that it covers by so much of the most covered one's share, pixels that
+# it covers by less than so much, and at least so many of each.
+FULLY_COVERED, HARDLY_COVERED, LEAST_LEARNT_PX = 0.7, 0.25, 12
 LEARNT_SHARE = 0.3  # of what is seen each time
 MOST_TURNED = 0.6  # the cosine of the angle by which a hue may drift from its name
 
@@ -56,7 +57,8 @@ class DriftingCover:
         """See the colour and its surroundings as they are now: a window of the picture and its cover."""
         if not self._drifts:
             return
-        own, around = cover > FULLY_COVERED, cover < HARDLY_COVERED
+        most = float(cover.max())
+        own, around = cover > FULLY_COVERED * most, cover < HARDLY_COVERED * most
         if min(np.count_nonzero(own), np.count_nonzero(around)) < LEAST_LEARNT_PX:
             return
         now = np.stack([CHROMA @ np.median(image[pixels], axis=0) for pixels in (own, around)])

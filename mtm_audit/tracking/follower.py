@@ -11,7 +11,9 @@ from mtm_audit.tracking.dictionaries import reads_in_a_mirror
 from mtm_audit.tracking.gather import Gather
 from mtm_audit.tracking.markers import MarkerFinder, Sighting
 
-FULL_SEARCH_EVERY_S = 0.5  # after which the whole picture is searched for markers that are new
+READ_EVERY_S = 0.25  # after which a marker's number is read again
+SURPRISE_SIDES = 0.08  # how far a corner may be from where it is expected, in sides, without being read
+FULL_SEARCH_EVERY_S = 0.75  # after which the whole picture is searched for markers that are new
 SEEN_AT_LEAST = 3  # frames; what is read less often is a chance reading of something else
 # For a marker out of sight the whole picture is searched in every frame at first, and then each time that it has been
 # so for a fifth longer.
@@ -27,11 +29,15 @@ Copy = tuple[int, int]
 
 @dataclass(frozen=True)
 class _Followed:
-    """A copy of a marker as it was last seen, how far its corners had moved since before, and in how many frames."""
+    """A copy of a marker as it was last seen, how far its corners had moved since before, and in how many frames.
+
+    `read_s` is when its number was last read; in between, its sides alone are followed.
+    """
 
     sighting: Sighting
     step: Floats
     seen_s: float
+    read_s: float
     count: int
 
     def expected(self, lost: bool) -> Floats:
@@ -61,13 +67,17 @@ class MarkerFollower:
         """Find the markers of the next frame."""
         self._gather.next_frame(frame)
         image: Image = np.ascontiguousarray(frame.image[:, ::-1] if self._mirrored else frame.image)
-        found = self._nearby(image, frame.time_s)
+        is_read_s = {copy: self._followed[copy].read_s for copy in self._followed}
+        continued = self._continued(image, frame.time_s)
+        read = self._nearby(image, frame.time_s, except_for=continued)
+        found = continued | read
         if self._is_search_due(found, frame.time_s):
             self._searched_s = frame.time_s
             self._add_new(self._finder.everywhere(image), found, frame.time_s)
-        fine = self._finder.refined(image, list(found.values()))
-        for copy, sighting in zip(found, fine, strict=True):
-            self._note(copy, sighting, frame.time_s)
+        rough = [copy for copy in found if copy not in continued]
+        fine = continued | dict(zip(rough, self._finder.refined(image, [found[copy] for copy in rough]), strict=True))
+        for copy, sighting in fine.items():
+            self._note(copy, sighting, frame.time_s, is_read_s[copy] if copy in continued else frame.time_s)
         self._last_s = frame.time_s
 
     def tracks(self) -> list[Track]:
@@ -82,10 +92,28 @@ class MarkerFollower:
         self._gather.extents_px = {name: self._gather.extents_px[_key(copy)] for copy, name in often.items()}
         return self._gather.tracks(with_headings=True)
 
-    def _nearby(self, image: Image, time_s: float) -> dict[Copy, Sighting]:
-        """The followed markers that are where they are expected."""
+    def _continued(self, image: Image, time_s: float) -> dict[Copy, Sighting]:
+        """The markers whose sides are where they are expected and as long as before; they were read a moment ago."""
+        recent = {
+            copy: last
+            for copy, last in self._followed.items()
+            if last.seen_s == self._last_s and last.count > 1 and time_s - last.read_s < READ_EVERY_S
+        }
+        expected = [Sighting(copy[0], last.expected(lost=False)) for copy, last in recent.items()]
+        fine = self._finder.refined(image, expected, keep=False)
+        pairs = zip(recent.items(), expected, fine, strict=True)
+        return {
+            copy: now
+            for (copy, last), guess, now in pairs
+            if np.abs(now.corners - guess.corners).max() < SURPRISE_SIDES * last.sighting.side_px
+        }
+
+    def _nearby(self, image: Image, time_s: float, except_for: dict[Copy, Sighting]) -> dict[Copy, Sighting]:
+        """The other followed markers that are read where they are expected."""
         found: dict[Copy, Sighting] = {}
         for copy, last in self._followed.items():
+            if copy in except_for:
+                continue
             if time_s - last.seen_s <= NEARBY_S or last.seen_s == self._last_s:
                 sighting = self._finder.near(image, copy[0], last.expected(lost=last.seen_s < self._last_s))
                 if sighting is not None and last.gap_sides(sighting) < self._reach_sides(last, time_s):
@@ -123,7 +151,7 @@ class MarkerFollower:
     def _reach_sides(self, last: _Followed, time_s: float) -> float:
         return 1.0 + SIDES_PER_S * (time_s - last.seen_s)
 
-    def _note(self, copy: Copy, sighting: Sighting, time_s: float) -> None:
+    def _note(self, copy: Copy, sighting: Sighting, time_s: float, read_s: float) -> None:
         column, row = sighting.centre
         # A robot's body reaches beyond its marker, and its shadow beyond that.
         extent_px = BODY_SIDES * sighting.side_px
@@ -131,7 +159,7 @@ class MarkerFollower:
         last = self._followed.get(copy)
         is_next = last is not None and last.seen_s == self._last_s
         step = sighting.corners - last.sighting.corners if last is not None and is_next else np.zeros((4, 2))
-        self._followed[copy] = _Followed(sighting, step, time_s, 1 + (last.count if last else 0))
+        self._followed[copy] = _Followed(sighting, step, time_s, read_s, 1 + (last.count if last else 0))
         self.sightings += 1
         if not reads_in_a_mirror(self._dictionary, sighting.number):
             self.decisive[sighting.number] += 1

@@ -43,7 +43,7 @@ class Sighting:
     @property
     def side_px(self) -> float:
         """The larger of the marker's width and height in the picture."""
-        return float(np.ptp(self.corners, axis=0).max())
+        return float((self.corners.max(axis=0) - self.corners.min(axis=0)).max())
 
 
 class MarkerFinder:
@@ -93,13 +93,17 @@ class MarkerFinder:
                 return Sighting(number, nearest.corners + origin)
         return None
 
-    def refined(self, image: Image, sightings: list[Sighting]) -> list[Sighting]:
-        """The sightings with corners to a few hundredths of a pixel; one whose sides cannot be measured stays."""
+    def refined(self, image: Image, sightings: list[Sighting], *, keep: bool = True) -> list[Sighting]:
+        """The sightings with corners to a few hundredths of a pixel.
+
+        One whose sides cannot be measured stays as it is, or gets corners of NaN when it is not to `keep`.
+        """
         if not sightings:
             return []
         rough = np.stack([sighting.corners for sighting in sightings])
         fine = refined_corners(image, rough, self._cells)
-        fine = np.where(np.isfinite(fine).all(axis=(1, 2), keepdims=True), fine, rough)
+        if keep:
+            fine = np.where(np.isfinite(fine).all(axis=(1, 2), keepdims=True), fine, rough)
         return [Sighting(one.number, corners) for one, corners in zip(sightings, fine, strict=True)]
 
 

@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING
 from mtm_onboard.commands.contentoptions import add_content, content
 
 if TYPE_CHECKING:
+    from mtm_onboard.firmware.image import Image
     from mtm_onboard.protocol import Channel, Scheme
 
 # DJI's limits for the chassis; others are options.
 _SPEED_MPS = 3.5
 _TURN_RATE_RADPS = 10.47
+# As the guard of the companion's program has it.
+_NOISE_SIGMAS = 4.0
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -29,7 +32,20 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--first-message", type=int, metavar="N", default=0, help="rolling schedule: slot of the first")
     parser.add_argument("--limit-mps", type=float, default=_SPEED_MPS, help="largest |vx| and |vy| sent (%(default)s)")
     parser.add_argument("--limit-radps", type=float, default=_TURN_RATE_RADPS, help="largest |wz| sent (%(default)s)")
-    parser.set_defaults(handler=run)
+    _add_seal(parser)
+    parser.set_defaults(handler=run, usage_error=parser.error)
+
+
+def _add_seal(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("seal", "for a device that takes only images that are sealed for it")
+    group.add_argument("--device-key", type=Path, metavar="FILE", help="the device's key, of mtm-onboard device-key")
+    group.add_argument("--device-channel", type=int, metavar="N", help="the device's own number (the channel's place)")
+    group.add_argument(
+        "--counter", type=int, metavar="N", help="higher than that of the device's last image (seconds since 1970)"
+    )
+    group.add_argument(
+        "--noise-limit", type=float, metavar="SIGMAS", help="cut the noise at so many times the channel's sigma (4)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -40,6 +56,10 @@ def run(args: argparse.Namespace) -> int:
     from mtm_onboard.protocol.framing import channel_symbols
     from mtm_onboard.runtime.message import message_of
 
+    if args.device_key is None and any(
+        value is not None for value in (args.device_channel, args.counter, args.noise_limit)
+    ):
+        args.usage_error("a seal needs --device-key")
     key = load_key(args.key)
     scheme = key.scheme
     channel = _channel(scheme, args.channel)
@@ -57,7 +77,9 @@ def run(args: argparse.Namespace) -> int:
         first_message=args.first_message,
         messages=messages,
     )
-    data = image_bytes(tagged(image, key.holding.decoy_seed()))
+    # The tag is of format 1, whose secret whoever provisions has; files of format 2 leave it empty.
+    image = tagged(image, key.secret) if isinstance(key.secret, bytes) else image
+    data = image_bytes(image) if args.device_key is None else _sealed(args, scheme, channel, image)
     with replacing(args.out, mode=0o600) as temporary:
         temporary.write_bytes(data)
     seconds = image.samples.shape[1] / scheme.rate_hz
@@ -67,6 +89,20 @@ def run(args: argparse.Namespace) -> int:
         f"{ending}, {scheme.rate_hz:g} Hz, scheme {scheme.fingerprint}"
     )
     return 0
+
+
+def _sealed(args: argparse.Namespace, scheme: "Scheme", channel: "Channel", image: "Image") -> bytes:
+    import time
+
+    from mtm_onboard.firmware.device_key import load_device_key
+    from mtm_onboard.firmware.seal import seal_of, sealed
+    from mtm_onboard.model.velocity import AXES
+
+    number = scheme.channels.index(channel) if args.device_channel is None else args.device_channel
+    counter = int(time.time()) if args.counter is None else args.counter
+    most = channel.sigma * (_NOISE_SIGMAS if args.noise_limit is None else args.noise_limit)
+    limits = [most if axis in channel.axes else 0.0 for axis in AXES]
+    return sealed(image, seal_of(number, counter, limits), load_device_key(args.device_key))
 
 
 def _channel(scheme: "Scheme", name: str | None) -> "Channel":

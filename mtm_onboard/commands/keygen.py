@@ -1,6 +1,7 @@
-"""`mtm-onboard keygen`: a fresh secret and its scheme, written to a key file."""
+"""`mtm-onboard keygen`: a fresh secret and its scheme: a master, or under a fixed schedule a key of format 1."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,23 @@ if TYPE_CHECKING:
     from mtm_onboard.protocol.framing import Framing
 
 _PRESETS: dict[str, dict[str, Any]] = {
+    # 8 bits with a tag in the 12 s of the paper's 8 bits: more symbols, each in a third of the time.
     "robomaster-fleet": {
+        "name": "robomaster-fleet",
+        "rate": 50.0,
+        "band": (0.5, 5.0),
+        "alphabet": 16,
+        "message_ticks": 600,
+        "channel": [f"robot{number}:vx,vy:3:0.1" for number in range(4)],
+        "power": "window",
+        "payload": ("integer", 8),
+        "number_bits": 4,
+        "check": ("tag", 24),
+        "code": "reed-solomon",
+        "interleave": True,
+    },
+    # As in the paper: without a tag, and with waveforms that come again.
+    "paper-robomaster-fleet": {
         "name": "robomaster-fleet",
         "rate": 50.0,
         "band": (0.5, 5.0),
@@ -19,12 +36,15 @@ _PRESETS: dict[str, dict[str, Any]] = {
         "message_ticks": 600,
         "channel": [f"robot{number}:vx,vy:1:0.1" for number in range(4)],
         "power": "window",
-    }
+        "schedule": "fixed",
+    },
 }
 # Ten years, leap days included.
 _USUAL_DAYS = 3653
 _REQUIRED = ("name", "rate", "band", "alphabet", "message_ticks", "channel")
 _CHOSEN_BY_SCHEME = ("combine", "pooling", "power", "schedule", "epoch")
+# Widths of a tag, the first that fits being taken where none is asked for.
+_TAG_BITS = (32, 24, 16)
 _FRAMING = ("payload", "number_bits", "check", "code", "interleave")
 
 
@@ -47,7 +67,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--combine", help="split (default): each channel carries its part; same: all carry all")
     parser.add_argument("--pooling", help="how auditors pool channels that carry the same: mean (default) or majority")
     parser.add_argument("--power", help="window (default): each window has mean square 1; ensemble: Gaussian samples")
-    parser.add_argument("--schedule", help="fixed (default): waveforms come again; rolling: none is played twice")
+    parser.add_argument("--schedule", help="rolling (default): no waveform is played twice; fixed: they come again")
     parser.add_argument("--epoch", type=int, metavar="N", help="number of the first epoch (0)")
     add_days(parser, _USUAL_DAYS)
     _add_framing(parser)
@@ -55,12 +75,17 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def _add_framing(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("framing", "without --payload a message is a plain number")
+    group = parser.add_argument_group(
+        "framing", "under a rolling schedule messages have a tag of 32, 24 or 16 bits, what fits, unless --check says "
+        "otherwise; without --payload the rest of a message is a number",
+    )  # fmt: skip
     group.add_argument(
         "--payload", type=_sized, metavar="KIND:SIZE", help="integer:BITS, bytes:BYTES or text:BYTES, such as text:16"
     )
     group.add_argument("--number-bits", type=int, metavar="BITS", help="carry the message's number, modulo 2**BITS (0)")
-    group.add_argument("--check", type=_sized, metavar="KIND:BITS", help="crc:BITS or tag:BITS, such as tag:32 (none)")
+    group.add_argument(
+        "--check", type=_sized, metavar="KIND:BITS", help="crc:BITS or tag:BITS, such as tag:32, or none"
+    )
     group.add_argument("--code", help="none (default), or reed-solomon: whatever is left free becomes parity")
     group.add_argument("--interleave", action="store_true", default=None, help="deal symbols over channels and time")
 
@@ -95,22 +120,45 @@ def _keygen(args: argparse.Namespace) -> int:
 def _chosen_scheme(args: argparse.Namespace, given: dict[str, Any]) -> "Scheme":
     from mtm_onboard.protocol import Scheme
 
-    chosen = _PRESETS.get(args.preset, {}) | {name: value for name, value in given.items() if value is not None}
+    chosen = {"schedule": "rolling"} | _PRESETS.get(args.preset, {})
+    chosen |= {name: value for name, value in given.items() if value is not None}
     missing = [f"--{name.replace('_', '-')}" for name in _REQUIRED if name not in chosen]
     if missing:
         args.usage_error(f"without --preset or --scheme these are needed: {', '.join(missing)}")
-    return Scheme(
+    scheme = Scheme(
         name=chosen["name"], rate_hz=chosen["rate"], band_hz=chosen["band"], alphabet_size=chosen["alphabet"],
         message_ticks=chosen["message_ticks"], channels=tuple(_channel(text) for text in chosen["channel"]),
-        framing=_framing(args, {name: chosen[name] for name in _FRAMING if name in chosen}),
         **{name: chosen[name] for name in _CHOSEN_BY_SCHEME if name in chosen},
     )  # fmt: skip
+    asked = {name: chosen[name] for name in _FRAMING if name in chosen}
+    if scheme.schedule == "rolling" and "check" not in asked:
+        return _tagged(args, scheme, asked)
+    return replace(scheme, framing=_framing(args, asked))
+
+
+def _tagged(args: argparse.Namespace, scheme: "Scheme", asked: dict[str, Any]) -> "Scheme":
+    """The scheme with the widest tag that fits beside the payload, or with a number in what a tag leaves over."""
+    from mtm_onboard.protocol import MtmError
+    from mtm_onboard.protocol.framing import payload_bits
+
+    refusal = None
+    for bits in _TAG_BITS:
+        left = payload_bits(scheme) - bits - asked.get("number_bits", 0)
+        payload = asked.get("payload", ("integer", max(1, min(64, left))))
+        try:
+            return replace(scheme, framing=_framing(args, asked | {"payload": payload, "check": ("tag", bits)}))
+        except MtmError as error:
+            refusal = error
+    raise MtmError(
+        f"there is no room for a tag ({refusal}); or say --check none, after which nothing "
+        "shows that the message was read right, or take a preset of the paper"
+    )
 
 
 def _framing(args: argparse.Namespace, chosen: dict[str, Any]) -> "Framing | None":
     from mtm_onboard.protocol.framing import Framing
 
-    if not chosen:
+    if not chosen or (chosen.keys() == {"check"} and chosen["check"] == ("none", 0)):
         return None
     if "payload" not in chosen:
         args.usage_error("a framing needs --payload, such as --payload integer:64")
@@ -120,6 +168,8 @@ def _framing(args: argparse.Namespace, chosen: dict[str, Any]) -> "Framing | Non
 
 
 def _sized(text: str) -> tuple[str, int]:
+    if text == "none":
+        return text, 0
     kind, size = text.split(":")
     return kind, int(size)
 

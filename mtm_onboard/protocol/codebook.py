@@ -50,7 +50,7 @@ class Codebook:
         scheme = self.scheme
         asked = range(scheme.alphabet_size) if symbols is None else symbols
         epoch, played = self._place(channel, window)
-        secret = self._holding.channel_secret(epoch, scheme.channels.index(channel))
+        secret = self._holding.channel_secret(epoch, scheme.channel_number(channel))
         first_axis = scheme.axis_index(channel)
         count = len(self.bins(channel))
         amplitudes = np.empty((len(asked), len(channel.axes), count))

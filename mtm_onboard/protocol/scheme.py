@@ -82,7 +82,7 @@ class Scheme:
 
         A channel with some of the axes only, in their order and next to each other, counts from the first of these.
         """
-        place = self._place(channel)
+        place = self.channel_number(channel)
         before = sum(len(other.axes) for other in self.channels[:place])
         return before + self.channels[place].axes.index(channel.axes[0])
 
@@ -90,9 +90,10 @@ class Scheme:
         """Position in the message of the first symbol of the channel; 0 when all channels carry the same."""
         if self.combine == "same":
             return 0
-        return sum(other.symbols for other in self.channels[: self._place(channel)])
+        return sum(other.symbols for other in self.channels[: self.channel_number(channel)])
 
-    def _place(self, channel: Channel) -> int:
+    def channel_number(self, channel: Channel) -> int:
+        """Which of the channels has this one's name; it may have some of the axes only."""
         return [other.name for other in self.channels].index(channel.name)
 
     @property

@@ -173,7 +173,7 @@ def contended(folder: Path, seconds: float, port: SlcanPort) -> Contended:
     observer = Observer(port)
     config, key = folder / "robot.toml", folder / "robot.key"
     config.write_text(CONFIG.format(port=port.path, folder=folder, priority=PRIORITY))
-    main(["keygen", "--id", "bench", "--out", str(key), "--preset", "robomaster-fleet"])
+    main(["keygen", "--id", "bench", "--out", str(key), "--preset", "paper-robomaster-fleet"])
     command = [sys.executable, "-m", "mtm_onboard", "run", "--config", config, "--key", key, "--message", "3"]
     with (
         busy_programs(2),

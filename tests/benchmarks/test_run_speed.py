@@ -138,7 +138,7 @@ class Robot:
         self.config, self.key = folder / "robot.toml", folder / "robot.key"
         self.journal, self.socket = folder / "journal.csv", folder / "control"
         self.config.write_text(CONFIG.format(folder=folder, transport=transport))
-        main(["keygen", "--id", "bench", "--out", str(self.key), "--preset", "robomaster-fleet", *keygen])
+        main(["keygen", "--id", "bench", "--out", str(self.key), "--preset", "paper-robomaster-fleet", *keygen])
 
     def run(self, ticks: int) -> tuple[float, int]:
         """Seconds from the start of the process to its first tick, and the most memory that it held, in bytes."""

@@ -10,10 +10,14 @@ import numpy as np
 import pytest
 
 from hil.sensors.camera import Camera, film
+from hil.sensors.optics import overhead
 from hil.sensors.poses import Trajectory
 from hil.sensors.scene import Scene
 from hil.sensors.video import write_video
 from mtm_audit.ingest.load import load_tracks
+from mtm_audit.model.picture import Frame
+from mtm_audit.readers.video import read_frames
+from mtm_audit.tracking.registry import tracker
 
 pytestmark = pytest.mark.benchmark(timer=time.process_time)
 SECONDS = 5.0
@@ -63,6 +67,43 @@ def test_tracking_a_video_takes_at_most_half_its_length(tmp_path, benchmark, nam
     assert [track.valid.all() for track in tracks] == [True] * 4
     ratio = times_real_time(benchmark, name)
     assert ratio is None or ratio >= 2
+
+
+def seconds_of_processor(work):
+    start_s = time.process_time()
+    work()
+    return time.process_time() - start_s
+
+
+def test_tracking_1080p60_costs_little_beside_decoding(tmp_path, benchmark):
+    camera = Camera(optics=overhead(width_px=1920, height_px=1080), rate_hz=60.0, blur_px=0.8, noise_levels=1.0)
+    frames = film(camera, Scene(), four_robots(), np.random.default_rng(1), 0.0, 3.0)
+    write_video(frames, tmp_path / "film.mp4", 60.0)
+    decoding_s = min(seconds_of_processor(lambda: list(map(id, read_frames(tmp_path / "film.mp4")))) for _ in range(3))
+    tracks = benchmark.pedantic(load_tracks, args=(tmp_path / "film.mp4", "aruco"), rounds=3)
+    assert [track.valid.all() for track in tracks] == [True] * 4
+    if benchmark.enabled:
+        ratio = benchmark.stats.stats.min / decoding_s
+        benchmark.extra_info["times_bare_decoding"] = round(ratio, 2)
+        print(f"\naruco: {ratio:.2f} times bare decoding at 1920 x 1080, 60 Hz, four robots")
+        assert ratio < 2.2
+
+
+def test_a_lost_colour_costs_at_most_three_times_a_seen_one(tmp_path, benchmark):
+    record(tmp_path / "film.mp4", Scene(colours_bgr=COLOURS_BGR))
+    pictures = list(read_frames(tmp_path / "film.mp4", "bgr"))
+    gone = [Frame(one.time_s, np.full_like(one.image, 120)) for one in pictures]
+    seen_s = min(seconds_of_processor(lambda: tracker("colour:cyan").track(pictures)) for _ in range(3))
+    benchmark.pedantic(
+        tracker("colour:cyan").track,
+        args=(pictures[:1] + [Frame(one.time_s + 10.0, one.image) for one in gone],),
+        rounds=3,
+    )
+    if benchmark.enabled:
+        ratio = benchmark.stats.stats.min / seen_s
+        benchmark.extra_info["times_a_seen_colour"] = round(ratio, 2)
+        print(f"\na lost colour: {ratio:.2f} times a seen one")
+        assert ratio < 3
 
 
 def test_filming_takes_at_most_half_of_the_time_filmed(tmp_path, benchmark):

@@ -72,7 +72,7 @@ def test_a_key_on_other_axes_than_the_robots_is_mentioned(tmp_path, capsys):
 def test_a_rolling_recording_says_when_it_was_made(tmp_path, capsys):
     key = tmp_path / "rolling.key"
     channels = [f"--channel=robot{number}:vx,vy:1:0.1" for number in range(4)]
-    keygen = ["--rate=50", "--band=0.5:5", "--alphabet=4", "--message-ticks=50", "--schedule=rolling", *channels]
+    keygen = ["--rate=50", "--band=0.5:5", "--alphabet=4", "--message-ticks=50", "--check=none", *channels]
     assert onboard(["keygen", "--id", "fake", "--name", "rolling", "--out", str(key), *keygen]) == 0
     assert run("record", "--seconds", "6", "--wire", "direct", "--message", 5, "--no-video", "--key", key,
                "--out", tmp_path / "a") == 0  # fmt: skip
@@ -92,6 +92,13 @@ def test_a_recording_is_filmed_and_a_given_key_stays(tmp_path):
     assert frames[0].size == (704, 704)
     truth = json.loads((tmp_path / "b" / "truth.json").read_text())
     assert (truth["message"], truth["onset_s"]) == (None, None)
+
+
+def test_a_film_can_be_that_of_a_surveillance_camera(tmp_path):
+    assert run(*QUICK, "--no-message", "--quality", "surveillance", "--out", tmp_path / "a") == 0
+    frames = list(read_frames(tmp_path / "a/video.mp4"))
+    assert len(frames) == 31
+    assert frames[-1].time_s == pytest.approx(2.0, abs=0.01)
 
 
 def test_two_recordings_of_one_seed_and_key_are_equal(tmp_path):

@@ -53,7 +53,7 @@ def keygen(path: Path, *options: str) -> int:
 
 @pytest.fixture
 def key(tmp_path):
-    assert keygen(tmp_path / "robot.key", "--preset", "robomaster-fleet") == 0
+    assert keygen(tmp_path / "robot.key", "--preset", "paper-robomaster-fleet") == 0
     return tmp_path / "robot.key"
 
 
@@ -87,7 +87,7 @@ def test_every_parameter_can_be_chosen(tmp_path):
     code = keygen(
         tmp_path / "a.key", "--name", "arms", "--rate", "20", "--band", "0.5:4", "--alphabet", "8",
         "--message-ticks", "400", "--channel", "inner:shoulder,elbow:2:0.3:arm", "--channel", "base:vx:2:0.1",
-        "--combine", "same", "--power", "ensemble", "--schedule", "rolling",
+        "--combine", "same", "--power", "ensemble", "--schedule", "rolling", "--check", "none",
     )  # fmt: skip
     scheme = load_key(tmp_path / "a.key").scheme
     assert code == 0
@@ -98,7 +98,7 @@ def test_every_parameter_can_be_chosen(tmp_path):
 
 
 def test_an_option_overrides_its_part_of_a_preset(tmp_path):
-    assert keygen(tmp_path / "a.key", "--preset", "robomaster-fleet", "--alphabet", "16") == 0
+    assert keygen(tmp_path / "a.key", "--preset", "paper-robomaster-fleet", "--alphabet", "16") == 0
     assert load_key(tmp_path / "a.key").scheme.alphabet_size == 16
 
 
@@ -119,9 +119,9 @@ def test_show_tells_the_scheme_and_never_the_secret(key, capsys):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (["--preset", "robomaster-fleet", "--band", "0.5:30"], "lower band_hz or raise rate_hz"),
-        (["--preset", "robomaster-fleet", "--channel", "robot0"], "NAME:AXES:SYMBOLS:SIGMA"),
-        (["--preset", "robomaster-fleet", "--schedule", "weekly"], "choose one of: fixed, rolling"),
+        (["--preset", "paper-robomaster-fleet", "--band", "0.5:30"], "lower band_hz or raise rate_hz"),
+        (["--preset", "paper-robomaster-fleet", "--channel", "robot0"], "NAME:AXES:SYMBOLS:SIGMA"),
+        (["--preset", "paper-robomaster-fleet", "--schedule", "weekly"], "choose one of: fixed, rolling"),
     ],
 )
 def test_a_scheme_that_cannot_be_is_an_error_of_one_sentence(tmp_path, capsys, options, sentence):
@@ -135,7 +135,7 @@ def test_a_scheme_that_cannot_be_is_an_error_of_one_sentence(tmp_path, capsys, o
 
 def test_a_key_is_never_overwritten(key, capsys):
     before = key.read_bytes()
-    assert keygen(key, "--preset", "robomaster-fleet") == 1
+    assert keygen(key, "--preset", "paper-robomaster-fleet") == 1
     assert key.read_bytes() == before
     assert "exists already" in capsys.readouterr().err
 

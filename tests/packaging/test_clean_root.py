@@ -25,7 +25,7 @@ from mtm_onboard.runtime.modulator import Modulator
 ROOT = Path(__file__).parents[2]
 PACKAGES = "python3,python3-numpy,python3-can,python3-serial,adduser,iproute2"
 HOME = "var/lib/mtm"
-KEYGEN = ("--id", "clean", "--preset", "robomaster-fleet", "--message-ticks", "30", "--band", "2:20")
+KEYGEN = ("--id", "clean", "--preset", "paper-robomaster-fleet", "--message-ticks", "30", "--band", "2:20")
 FIRST, SECOND = 178, 27
 CONFIG = """
 [robot]

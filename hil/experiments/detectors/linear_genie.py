@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import signal
 
 from hil.experiments.detectors.body_frame import in_body_frame
@@ -37,8 +36,11 @@ class GenieKnowledge:
     interference: tuple[Interference, ...]
 
 
-def genie_symbols(seen: Motion, sending: Sending, known: GenieKnowledge, windows: int) -> NDArray[np.int64]:
-    """The likeliest symbol of each of the first `windows` windows that `sending` plays, (windows,)."""
+def genie_scores(seen: Motion, sending: Sending, known: GenieKnowledge, windows: int) -> Floats:
+    """Log-likelihoods, nats, of each symbol in the first `windows` windows that `sending` plays, (windows, M).
+
+    Those of a window are known up to a constant.
+    """
     length_s = window_s(sending)
     edges_s = seen.start_s + np.arange(len(seen.seen) + 1) * seen.step_s - sending.onset_s
     last = min(int(np.ceil(edges_s[-1] / length_s)), sending.messages * len(sending.symbols))
@@ -47,18 +49,17 @@ def genie_symbols(seen: Motion, sending: Sending, known: GenieKnowledge, windows
     sent = {number: sending.symbols[number % len(sending.symbols)] for number in numbers}
     unexplained = seen.velocities - sum(candidates[number][sent[number]] for number in numbers)
     before = max(len(own.filter) for own in known.interference)
-    decided = np.empty(windows, dtype=np.int64)
+    scores = np.empty((windows, len(known.moved)))
     for window in range(windows):
         start = int((window * length_s - edges_s[0]) / seen.step_s)
         bins = slice(max(0, start - before), start + int((length_s + TAIL_S) / seen.step_s))
         residual = (unexplained + candidates[window][sent[window]])[:, bins] * seen.seen[bins]
         tried = candidates[window][:, :, bins] * seen.seen[bins]
-        scores = sum(
+        scores[window] = sum(
             log_likelihoods(residual[axis : axis + 1], tried[:, axis : axis + 1], own)
             for axis, own in enumerate(known.interference)
         )
-        decided[window] = np.argmax(scores)
-    return decided
+    return scores
 
 
 def window_s(sending: Sending) -> float:

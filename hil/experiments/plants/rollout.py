@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.experiments.detectors.linear_genie import axis_motion, genie_symbols
+from hil.experiments.detectors.linear_genie import axis_motion, genie_scores
 from hil.experiments.plants.genie import knowledge_of
 from hil.experiments.runs.cells import Cell, Scalar, Values
 from hil.fleet.driven import sent_track
@@ -81,12 +81,12 @@ def read_plant(parameters: Values, seed: int) -> dict[str, Scalar]:
     track = sent_track("robot", mover, [sending], ONSET_S + _LONGEST_MESSAGE * message_s + 0.1, draw, robot)
     once = _until(ONSET_S + message_s + _AFTER_S, track)
     motion = axis_motion(once, mover.kind.axes, scheme.band_hz[1], body=mover.kind.has_heading)
-    genie = genie_symbols(motion, sending, knowledge_of(mover, robot, sending, draw), job.windows)
+    genie = genie_scores(motion, sending, knowledge_of(mover, robot, sending, draw), job.windows)
     matched = _decoded(once, key, DecodeSettings(onset_s=ONSET_S))
     # Decoys do not change what the paper's detector scores; it wants some.
     coherency = _decoded(track, key, DecodeSettings(detector="coherency", onset_s=ONSET_S, decoys=2))
     return {
-        "genie": int(np.sum(genie == symbols)),
+        "genie": int(np.sum(np.argmax(genie, axis=1) == symbols)),
         "matched": _right(matched, symbols),
         "coherency": _right(coherency, symbols),
         **_verdict(matched, symbols),

@@ -10,14 +10,14 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.special import softmax
 
 from hil.experiments.detectors.body_frame import known_headings
 from hil.experiments.detectors.linear_genie import (
     GenieKnowledge,
     axis_motion,
     fit_interference,
-    genie_symbols,
+    genie_scores,
     moved_by_responses,
 )
 from hil.experiments.real.added import Frame, with_message
@@ -27,7 +27,7 @@ from hil.plants.linear_response import LinearResponse, draw_response
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.ingest.load import load_tracks
-from mtm_audit.model.track import Track
+from mtm_audit.model.track import Floats, Track
 from mtm_onboard.protocol import Channel, Key, MtmError, Scheme
 
 RATE_HZ = 50.0
@@ -71,6 +71,7 @@ class RealJob:
 _NOTHING: dict[str, Scalar] = {
     **dict.fromkeys(("onset_s", "delay_s", "natural_hz", "damping", "gain", "rate_scale", "bits"), 0.0),
     **dict.fromkeys(("windows", "genie", *DETECTORS), 0), "verdict": "refused", "likeliest_right": False,
+    "genie_sure": False,
 }  # fmt: skip
 
 
@@ -95,7 +96,10 @@ def job_of(parameters: Values) -> RealJob:
 
 
 def read_real(parameters: Values, seed: int) -> dict[str, Scalar]:
-    """Add a message to the track in `path` and read it: the verdict, whether it is right, evidence, right windows."""
+    """Add a message to the track in `path` and read it: the verdict, whether it is right, evidence, right windows.
+
+    `genie_sure` says whether the genie gives the right symbol, over all windows, a probability of 1 less the threshold.
+    """
     job = job_of(parameters)
     track = recorded_track(Path(str(parameters["path"])), str(parameters["digest"]))
     draw = np.random.default_rng([_STREAM, seed])
@@ -117,31 +121,32 @@ def read_real(parameters: Values, seed: int) -> dict[str, Scalar]:
     responses = dict.fromkeys(scheme.channels[0].axes, response)
     seen = with_message(silent, sending, responses, job.frame)
     windows = int((seen.times_s[-1] - onset_s) * rate_scale / job.window_s)
-    genie = _genie_symbols(silent, seen, sending, responses, job.frame, windows)
+    scores = _genie_scores(silent, seen, sending, responses, job.frame, windows)
     result: dict[str, Scalar] = {
         "symbol": symbol, "start_s": float(silent.times_s[0]), "onset_s": onset_s, "delay_s": response.delay_s,
         "natural_hz": float(response.natural_hz or 0.0), "damping": response.damping, "gain": response.gain,
-        "rate_scale": rate_scale, "windows": windows, "genie": int(np.sum(genie == symbol)),
+        "rate_scale": rate_scale, "windows": windows, "genie": int(np.sum(np.argmax(scores, axis=1) == symbol)),
+        "genie_sure": bool(softmax(scores.sum(axis=0))[symbol] >= 1.0 - job.threshold),
     }  # fmt: skip
     for detector in DETECTORS:
         result[detector] = right_windows(seen, key, detector, onset_s, windows, symbol)
     return {**result, **_verdict(seen, key, job, onset_s, symbol)}
 
 
-def _genie_symbols(
+def _genie_scores(
     silent: Track,
     seen: Track,
     sending: Sending,
     responses: Mapping[str, LinearResponse],
     frame: Frame,
     windows: int,
-) -> NDArray[np.int64]:
-    """Symbols by the linear genie, whose interference is fitted to the motion before the message was added."""
+) -> Floats:
+    """(windows, M) by the linear genie; its interference is fitted to the motion before the message was added."""
     axes, highest_hz = sending.channel.axes, sending.codebook.scheme.band_hz[1]
     before, after = (axis_motion(track, axes, highest_hz, body=frame == "body") for track in (silent, seen))
     interference = tuple(fit_interference([before], axis) for axis in range(len(axes)))
     known = GenieKnowledge(moved_by_responses(sending, responses), interference)
-    return genie_symbols(after, sending, known, windows)
+    return genie_scores(after, sending, known, windows)
 
 
 def right_windows(track: Track, key: Key, detector: str, onset_s: float, windows: int, symbol: int) -> int:

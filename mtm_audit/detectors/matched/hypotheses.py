@@ -12,6 +12,8 @@ from mtm_audit.model.track import Bools, Floats
 _DRIFT_S = 0.02
 # Clocks that are off by more than this are possible but rare: the scale of a Cauchy prior over relative rates.
 _USUAL_RATE_ERROR = 0.003
+# Log prior, beside the nominal rate's, of rates within a thousandth: quartz is better than that.
+_USUAL_LOG_PRIOR = -0.1
 
 
 @dataclass(frozen=True)
@@ -80,9 +82,9 @@ def log_rate_prior(rates_hz: Floats, nominal_hz: float) -> Floats:
     return np.asarray(-np.log1p(((rates_hz / nominal_hz - 1.0) / _USUAL_RATE_ERROR) ** 2))
 
 
-def fold(evidence: Floats, grid: Grid, most: int) -> list[list[Hypothesis]]:
-    """Add up the windows' evidence (codebooks, numbered windows, lags) and return each codebook's best hypotheses, one
-    a local maximum.
+def fold(evidence: Floats, grid: Grid, most: int, usual: int = 0) -> list[list[Hypothesis]]:
+    """Add up the windows' evidence (codebooks, numbered windows, lags) and return each codebook's best hypotheses: the
+    `most` best local maxima, and the `usual` best starts at the rates of usual clocks, be they maxima or not.
     """
     places = np.clip(np.rint(grid.lags).astype(np.int64), 0, evidence.shape[2] - 1)
     # Windows that cannot be seen point at a place of their own that says nothing.
@@ -91,7 +93,21 @@ def fold(evidence: Floats, grid: Grid, most: int) -> list[list[Hypothesis]]:
     flat = np.ascontiguousarray(flat.transpose(2, 0, 1))
     # A window either carries the message or is silent, even odds: a recording may hold more than the message.
     carried = np.logaddexp(0.0, evidence) - np.log(2.0)
-    return [_peaks(np.append(each, 0.0)[flat].sum(axis=0) + grid.prior[:, None], most) for each in carried]
+    found = []
+    for each in carried:
+        totals = np.append(each, 0.0)[flat].sum(axis=0) + grid.prior[:, None]
+        found.append(list(dict.fromkeys([*_peaks(totals, most), *_usual(totals, grid.prior, usual)])))
+    return found
+
+
+def _usual(totals: Floats, prior: Floats, most: int) -> list[Hypothesis]:
+    """The best starts of (fine rates, starts), each at the best rate that nearly every clock has."""
+    rates = np.flatnonzero(prior > _USUAL_LOG_PRIOR)
+    if most == 0 or not len(rates):
+        return []
+    best = np.argmax(totals[rates], axis=0)
+    ridge = totals[rates[best], np.arange(totals.shape[1])]
+    return [Hypothesis(int(rates[best[start]]), int(start), float(ridge[start])) for start in np.argsort(-ridge)[:most]]
 
 
 def _peaks(totals: Floats, most: int) -> list[Hypothesis]:

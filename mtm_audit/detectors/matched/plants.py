@@ -1,8 +1,8 @@
 """What the robot and the camera may do to a waveform: a family of short filters, and tones passed through them.
 
-Every member is a pure delay and a first-order lag; some give back after a while what they have followed, as a robot
-does whose controller holds a place against the noise. Gains, signs and mixing of axes are left to the estimate. Impulse
-responses are sampled every hundredth of a second.
+A member is a pure delay and a first-order lag; some give back after a while what they have followed, as a robot does
+whose controller holds a place against the noise; some are second-order, as a speed loop or a body that tilts. Gains,
+signs and mixing of axes are left to the estimate. Impulse responses are sampled every hundredth of a second.
 """
 
 from collections.abc import Sequence
@@ -56,9 +56,23 @@ def returning(family: Plants, returns_s: Sequence[float]) -> Plants:
                   np.array(taps))  # fmt: skip
 
 
-def joined(one: Plants, other: Plants) -> Plants:
-    """The plants of both families."""
-    return Plants(*(np.concatenate([getattr(one, field.name), getattr(other, field.name)]) for field in fields(Plants)))
+def second_order(naturals_hz: Sequence[float], damping: float) -> Plants:
+    """Undelayed plants of two poles with these natural frequencies, of unit gain at zero frequency; damping below 1.
+
+    The lag given for each is that of its phase at low frequencies.
+    """
+    instants_s = np.arange(0.0, MEMORY_S, TAP_S) + TAP_S / 2.0
+    rates = 2.0 * np.pi * np.array(naturals_hz)
+    swings = np.exp(-damping * rates[:, None] * instants_s) * np.sin(
+        rates[:, None] * np.sqrt(1.0 - damping**2) * instants_s
+    )
+    return Plants(np.zeros(len(rates)), 2.0 * damping / rates, np.full(len(rates), np.inf),
+                  swings / swings.sum(axis=1, keepdims=True))  # fmt: skip
+
+
+def joined(*families: Plants) -> Plants:
+    """The plants of all families."""
+    return Plants(*(np.concatenate([getattr(one, field.name) for one in families]) for field in fields(Plants)))
 
 
 # Prior ranges: delay 1 to 8 ticks of a 50 Hz loop, lag 0.05 to 0.4 s; and the noise undone with a tenth of a second or

@@ -25,9 +25,13 @@ SEARCHED_RATES = 0.2
 _PHASE_ERROR_RAD = 0.6
 _PEAKS_PER_RATE = 8
 _WEIGHED = 64
+# Window by window a weak message is lost among starts; at usual rates so many are weighed whatever they look like.
+_USUAL_STARTS = 128
 _USUAL_RATES = 0.03
 _PLAIN_NATS = 20.0
 _HALF_CELLS = np.arange(-3, 4) / 2.0
+# How much later than the typical plant a robot may follow, where its onset is known.
+_LATER_S = np.array([0.0, 0.1, 0.2])
 
 
 @dataclass(frozen=True)
@@ -112,25 +116,34 @@ def search_timings(
             progress(fraction)
 
     if isinstance(onset, int | float):
-        return _rates_at_known_onset(place, len(rates_hz), tones, motion, lead, report)
+        return _delays_and_rates(place, len(rates_hz), tones, motion, lead, report)
     return _onsets_and_rates(place, len(rates_hz), spacing, tones, motion, lead, report)
 
 
-def _rates_at_known_onset(
+def _delays_and_rates(
     place: _Place, rates: int, tones: Sequence[Sequence[Tones]], motion: Motion, lead: int, report: _Report
 ) -> list[Found]:
-    """Only the rate is open, so that every fine rate can be weighed with one set of gains."""
-    best: list[Found] = []
+    """Only the rate is open, and how late the robot follows: all can be weighed with one set of gains."""
+    best: list[tuple[Found, int]] = []
+    shifts = _LATER_S / motion.step_s
     for coarse in range(rates):
         report(coarse / rates)
         heard, grid = place(coarse)
-        found = _surroundings(heard, grid, tones, [0] * len(tones), motion, lead, onset_known=True)
-        best = found if not best else [max(pair, key=_found_evidence) for pair in zip(best, found, strict=True)]
-    return best
+        found = _surroundings(heard, grid, tones, [0] * len(tones), motion, lead, shifts)
+        here = [(each, coarse) for each in found]
+        best = here if not best else [max(pair, key=_found_evidence) for pair in zip(best, here, strict=True)]
+    return [_closer(place, coarse, each, tones[number], motion, lead) for number, (each, coarse) in enumerate(best)]
 
 
-def _found_evidence(found: Found) -> float:
-    return found.evidence
+def _found_evidence(found: tuple[Found, int]) -> float:
+    return found[0].evidence
+
+
+def _closer(place: _Place, coarse: int, found: Found, tones: Sequence[Tones], motion: Motion, lead: int) -> Found:
+    """The best timing in half cells around one that was found with a known onset."""
+    heard, grid = place(coarse)
+    later = (found.timing.onset_s - motion.start_s) / motion.step_s + lead - grid.starts[0]
+    return _surroundings(heard, grid, [tones], [0], motion, lead, later + _HALF_CELLS)[0]
 
 
 def _onsets_and_rates(
@@ -161,7 +174,7 @@ def _onsets_and_rates(
         heard, grid = place(coarse)
         numbers = [number for number, (_, winner) in enumerate(best) if winner.coarse == coarse]
         starts = [best[number][1].hypothesis.start for number in numbers]
-        near = _surroundings(heard, grid, [tones[n] for n in numbers], starts, motion, lead, onset_known=False)
+        near = _surroundings(heard, grid, [tones[n] for n in numbers], starts, motion, lead, _HALF_CELLS)
         found_at.update(zip(numbers, near, strict=True))
     return [found_at[number] for number in range(len(best))]
 
@@ -174,9 +187,10 @@ def _best_of_rates(
     for done, coarse in enumerate(rates):
         report(0.5 * done / len(rates))
         heard, grid = place(coarse)
-        for number, peaks in enumerate(fold(evidence_by_lag(tones, heard), grid, _PEAKS_PER_RATE)):
+        for number, peaks in enumerate(fold(evidence_by_lag(tones, heard), grid, _PEAKS_PER_RATE, _USUAL_STARTS)):
             candidates[number] += [_Candidate(coarse, peak) for peak in peaks]
-    chosen = [sorted(found, key=lambda item: -item.hypothesis.evidence)[:_WEIGHED] for found in candidates]
+    chosen = [sorted(found, key=lambda item: -item.hypothesis.evidence)[: _WEIGHED + _USUAL_STARTS]
+              for found in candidates]  # fmt: skip
     best = [(-np.inf, found[0]) for found in chosen]
     for coarse in sorted({item.coarse for found in chosen for item in found}):
         heard, grid = place(coarse)
@@ -221,11 +235,9 @@ def _surroundings(
     starts: Sequence[int],
     motion: Motion,
     lead: int,
-    *,
-    onset_known: bool,
+    shifts: Floats,
 ) -> list[Found]:
-    """For each codebook the best timing around its start: all fine rates of the grid, onsets in half cells or known."""
-    shifts = np.zeros(1) if onset_known else _HALF_CELLS
+    """For each codebook the best timing around its start: all fine rates of the grid, onsets `shifts` cells later."""
     around = {}
     for start in set(starts):
         lags = grid.lags[:, start][:, None, :] + shifts[None, :, None]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from mtm_audit.model.compression import Compression
-from mtm_audit.readers.video.opened import opened_video
+from mtm_audit.readers.video.opened import decoding_errors, opened_video
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -30,7 +30,7 @@ def read_compression(path: Path) -> Compression | None:
         codec, pixels = context.name, stream.width * stream.height
         context.options = {"export_side_data": "venc_params"}
         # Where a film is damaged, what came before tells enough.
-        with suppress(OSError, ValueError):
+        with suppress(*decoding_errors()):
             for packet in container.demux(stream):
                 size_bits += 8 * packet.size
                 packets += packet.size > 0

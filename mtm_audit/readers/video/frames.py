@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mtm_audit.model.picture import Frame, Pixels
 from mtm_audit.readers.video.clock import Clock, clock_of
 from mtm_audit.readers.video.header import announced_duration_s
-from mtm_audit.readers.video.opened import opened_video
+from mtm_audit.readers.video.opened import decoding_errors, opened_video
 from mtm_audit.readers.video.orientation import Orientation, orientation_of
 from mtm_audit.readers.video.pixels import image_of
 from mtm_onboard.protocol.errors import MtmError
@@ -93,7 +93,7 @@ def _pictures(
                     progress.damage = "a frame is corrupt"
                     return
                 yield picture
-    except (OSError, ValueError) as error:
+    except decoding_errors() as error:
         progress.damage = str(error)
 
 

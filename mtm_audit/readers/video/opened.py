@@ -26,7 +26,7 @@ def opened_video(path: Path) -> Iterator[tuple["InputContainer", "VideoStream"]]
     check_readable(path)
     try:
         container = av.open(str(path))
-    except (OSError, ValueError) as error:
+    except decoding_errors() as error:
         raise MtmError(
             f"{path} is not a video that can be read, or its end is missing; copy it again or convert it to MP4"
         ) from error
@@ -38,6 +38,13 @@ def opened_video(path: Path) -> Iterator[tuple["InputContainer", "VideoStream"]]
         yield container, stream
 
 
+def decoding_errors() -> tuple[type[Exception], ...]:
+    """What the library raises for files that are damaged or not what they seem."""
+    import av
+
+    return av.FFmpegError, OSError, ValueError
+
+
 def _film_of(path: Path, container: "InputContainer") -> "VideoStream":
     """The first stream that is no still picture: drones and cutters put a cover into the file, often first."""
     streams = container.streams.video
@@ -46,6 +53,9 @@ def _film_of(path: Path, container: "InputContainer") -> "VideoStream":
     films = [stream for stream in streams if not _is_cover(stream)]
     if not films:
         raise MtmError(f"{path} holds a cover picture and no film; name a file with a film in it")
+    films = [stream for stream in films if stream.codec_context is not None]
+    if not films:
+        raise MtmError(f"{path} is coded in a way that cannot be read here; convert it to H.264 in MP4")
     # Not every program marks its cover as one.
     return next((stream for stream in films if stream.codec_context.name not in _STILL_CODECS), films[0])
 

@@ -1,3 +1,5 @@
+import zlib
+
 import cv2
 import numpy as np
 import pytest
@@ -55,7 +57,12 @@ def test_without_a_rate_other_names_are_refused(tmp_path):
         times_of(save(tmp_path, "f1.png", "f2.png"))
 
 
-@pytest.mark.parametrize("content", [b"", b"no picture"])
+# A PNG header that announces a picture of 2^31 x 2^31 pixels, its checksum right.
+HUGE = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\x7f\xff\xff\xff\x7f\xff\xff\xff\x08\x02\0\0\0"
+HUGE += zlib.crc32(HUGE[12:]).to_bytes(4, "big")
+
+
+@pytest.mark.parametrize("content", [b"", b"no picture", HUGE])
 def test_a_picture_that_is_none_is_named(tmp_path, content):
     save(tmp_path, "f1.png", "f2.png")
     (tmp_path / "f2.png").write_bytes(content)

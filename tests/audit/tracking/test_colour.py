@@ -17,14 +17,18 @@ def pictures(gains=lambda time_s: (1.0, 1.0, 1.0), hidden=(), size=SIZE, count=S
     for number in range(count):
         image = np.full((*size, 3), 150.0)
         if number not in hidden:
-            left = place(number)
-            image[100:120, left : left + 20] = (40, 40, 200)
+            left, part = divmod(place(number), 1.0)
+            cover = np.zeros(21)
+            cover[:20] += 1.0 - part
+            cover[1:] += part
+            square = image[100:120, int(left) : int(left) + 21]
+            square += cover[:, None] * (np.array([40.0, 40.0, 200.0]) - square)
         image = image * gains(number / RATE_HZ) + rng.normal(0, 1.5, image.shape)
         yield Frame(number / RATE_HZ, np.clip(image, 0, 255).astype(np.uint8))
 
 
 def place(number):
-    return int(150 + 80 * np.sin(number / 9))
+    return 150 + 80 * np.sin(number / 9)
 
 
 def off_px(track):
@@ -34,21 +38,29 @@ def off_px(track):
 
 
 def warming(time_s):
-    """White balance that drifts by a quarter each way."""
+    """White balance that drifts to the red."""
     part = time_s / SECONDS
-    return (1.0 - 0.25 * part, 1.0, 1.0 + 0.25 * part)
+    return (1.0 - 0.3 * part, 1.0, 1.0 + 0.2 * part)
 
 
 def cooling(time_s):
     part = time_s / SECONDS
-    return (1.0 + 0.3 * part, 1.0, 1.0 - 0.3 * part)
+    return (1.0 + 0.5 * part, 1.0, 1.0 - 0.45 * part)
 
 
 @pytest.mark.parametrize("gains", [warming, cooling])
 def test_a_colour_is_followed_while_the_white_balance_drifts(gains):
     (track,) = tracker("colour:red").track(pictures(gains))
     assert track.valid.all()
-    assert off_px(track) < 0.1
+    assert off_px(track) < 0.05
+
+
+def test_without_learning_a_drift_loses_the_colour(monkeypatch):
+    """What the others are measured by."""
+    monkeypatch.setattr(colour, "LEARNT_EVERY", 10**9)
+    (track,) = tracker("colour:red").track(pictures(cooling))
+    assert track.valid.mean() < 0.8
+    assert off_px(track) > 0.2
 
 
 def test_steady_light_changes_nothing(monkeypatch):

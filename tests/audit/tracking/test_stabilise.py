@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from mtm_audit.decoding.assignment import assign_tracks
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.track import Track
 from mtm_audit.tracking.background import BackgroundFollower
@@ -13,6 +14,7 @@ from mtm_audit.tracking.reference import reference_path, still_tracks
 from mtm_audit.tracking.registry import tracker
 from mtm_audit.tracking.stabilise import stabilised_tracks
 from mtm_onboard.protocol import MtmError
+from tests.audit.moving_robot import scheme_of
 
 WIDTH, HEIGHT, FRAMES = 400, 300, 45
 MIDDLE = np.array([(WIDTH - 1) / 2, (HEIGHT - 1) / 2])
@@ -24,14 +26,14 @@ def sheet(number, side_px=36):
     return cv2.copyMakeBorder(marker, 6, 6, 6, 6, cv2.BORDER_CONSTANT, value=255)
 
 
-def room(textured=True, markers=()):
+def room(textured=True, markers=(), numbers=range(40, 50)):
     """What stands still, larger than the picture by 50 pixels on each side."""
     rng = np.random.default_rng(1)
     ground = np.full((HEIGHT + 100, WIDTH + 100), 120.0, np.float32)
     if textured:
         ground += cv2.GaussianBlur(rng.normal(0, 150, ground.shape).astype(np.float32), (0, 0), 2.0)
     ground = np.clip(ground, 0, 255).astype(np.uint8)
-    for number, (column, row) in zip(range(40, 50), markers, strict=False):
+    for number, (column, row) in zip(numbers, markers, strict=False):
         ground[row + 26 : row + 74, column + 26 : column + 74] = sheet(number)
     return ground
 
@@ -119,6 +121,16 @@ def test_a_camera_that_stands_still_is_left_alone(markers):
 
 def test_a_mirrored_film_is_stabilised_too():
     assert off_px(robot(film(room(), 6.0, mirrored=True))) < 0.1
+
+
+def test_a_floor_marker_with_a_robots_number_is_no_robot():
+    """Body robot0 carries marker 3 and marker 0 lies on the floor, before a camera that shakes."""
+    ground = room(markers=CORNERS[:1], numbers=(0,))
+    tracks = stabilised_tracks(tracker("aruco"), film(ground, 8.0))
+    assert [track.name for track in tracks] == ["marker0", "marker3"]
+    assignment = assign_tracks(scheme_of(bodies=("robot0",)), tracks)
+    assert assignment.settled == {}
+    assert assignment.unsettled == ("robot0",)
 
 
 def test_headings_are_in_the_frame_of_the_positions():

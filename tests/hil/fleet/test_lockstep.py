@@ -83,7 +83,7 @@ def test_slip_permutation_and_sensors_have_seeds_of_their_own():
 
 
 def test_the_fleet_s_scheme_is_the_key_generator_s_preset(tmp_path, capsys):
-    onboard(["keygen", "--id", "a", "--preset", "robomaster-fleet", "--out", str(tmp_path / "a.key")])
+    onboard(["keygen", "--id", "a", "--preset", "paper-robomaster-fleet", "--out", str(tmp_path / "a.key")])
     assert fake_key(600).scheme.fingerprint in capsys.readouterr().out
 
 

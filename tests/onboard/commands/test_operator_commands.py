@@ -10,7 +10,7 @@ from mtm_onboard.protocol import MtmError, load_key
 from mtm_onboard.protocol.framing import Framing
 
 FRAMED = (
-    "--preset", "robomaster-fleet", "--message-ticks", "6000", "--channel", "robot0:vx,vy:40:0.1",
+    "--preset", "paper-robomaster-fleet", "--message-ticks", "6000", "--channel", "robot0:vx,vy:40:0.1",
     "--channel", "robot1:vx,vy:40:0.1", "--payload", "text:8", "--check", "tag:32", "--code", "reed-solomon",
     "--number-bits", "4", "--interleave", "--schedule", "rolling", "--epoch", "3", "--pooling", "majority",
 )  # fmt: skip
@@ -54,12 +54,112 @@ def test_keygen_provisions_a_framing_and_the_schedule_s_options(tmp_path):
 
 
 def test_without_framing_options_a_message_is_a_plain_number(tmp_path):
-    assert keygen(tmp_path, "--preset", "robomaster-fleet") == 0
+    assert keygen(tmp_path, "--preset", "paper-robomaster-fleet") == 0
     assert load_key(tmp_path / "robot.key").scheme.framing is None
 
 
+def test_new_keys_are_masters_rolling_and_tagged(tmp_path, capsys):
+    assert keygen(tmp_path, "--preset", "robomaster-fleet", "--first-day", "2026-11-30", "--days", "7") == 0
+    key = load_key(tmp_path / "robot.key")
+    grant = key.holding.grant
+    assert (grant.kind, str(grant.first_day), str(grant.last_day)) == ("master", "2026-11-30", "2026-12-06")
+    assert (key.scheme.schedule, key.scheme.framing.check, key.scheme.message_ticks) == ("rolling", "tag", 600)
+    assert "keep it secret and apart" in capsys.readouterr().out
+
+
+PLAIN = ("--name", "x", "--rate", "50", "--band", "0.5:5", "--alphabet", "16")
+
+
+@pytest.mark.parametrize(
+    ("options", "framing"),
+    [
+        (("--channel", "a:vx:10:0.1"), Framing("integer", 8, check="tag", check_bits=32)),
+        (("--channel", "a:vx:8:0.1"), Framing("integer", 8, check="tag", check_bits=24)),
+        (("--channel", "a:vx:5:0.1"), Framing("integer", 4, check="tag", check_bits=16)),
+        (("--channel", "a:vx:10:0.1", "--payload", "integer:20"), Framing("integer", 20, check="tag", check_bits=16)),
+        (("--channel", "a:vx:10:0.1", "--check", "none"), None),
+        (("--channel", "a:vx:10:0.1", "--schedule", "fixed"), None),
+    ],
+)
+def test_the_widest_tag_that_fits_is_taken(tmp_path, options, framing):
+    ticks = "3000" if "a:vx:8:0.1" not in options else "3200"
+    assert keygen(tmp_path, *PLAIN, "--message-ticks", ticks, *options) == 0
+    assert load_key(tmp_path / "robot.key").scheme.framing == framing
+
+
+def test_a_message_without_room_for_a_tag_says_so(tmp_path, capsys):
+    assert keygen(tmp_path, *PLAIN, "--message-ticks", "600", "--channel", "a:vx:4:0.1") == 1
+    assert "there is no room for a tag" in capsys.readouterr().err
+    assert not (tmp_path / "robot.key").exists()
+
+
+def test_files_are_issued_disclosed_and_revoked(tmp_path, capsys):
+    assert keygen(tmp_path, "--preset", "robomaster-fleet", "--first-day", "2026-01-01", "--days", "400") == 0
+    master = ["--master", str(tmp_path / "robot.key")]
+    span = ["--first-day", "2026-01-05", "--days", "2"]
+    assert main(["issue", *master, "--channel", "robot1", *span, "--out", str(tmp_path / "r1.key"),
+                 "--not-after", "2026-01-06T12:00:00"]) == 0  # fmt: skip
+    assert main(["issue", *master, "--auditor", *span, "--out", str(tmp_path / "a.key")]) == 0
+    assert main(["anchor", *master, "--out", str(tmp_path / "fleet.anchor")]) == 0
+    capsys.readouterr()
+    assert main(["show", "--key", str(tmp_path / "r1.key")]) == 0
+    shown = capsys.readouterr().out
+    for fact in ("robot, serial ", "play robot1, and make the fleet's tags", "2026-01-05 to 2026-01-06 in UTC (2)",
+                 "not after     2026-01-06 12:00:00 UTC"):  # fmt: skip
+        assert fact in shown
+    grant = load_key(tmp_path / "a.key").holding.grant
+    assert (grant.kind, grant.channels) == ("auditor", ("robot0", "robot1", "robot2", "robot3"))
+    disclose = ["disclose", *master, "--out", str(tmp_path / "day.key"), "--allow-unsynchronised", "--day"]
+    assert main([*disclose, "2126-01-05"]) == 1
+    assert "not to be disclosed before 2126-01-06 01:00" in capsys.readouterr().err
+    assert not (tmp_path / "day.key").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--channel", "robot9"), "no channel 'robot9'"),
+        (("--channel", "robot1", "--first-day", "2020-01-01"), "this master is for"),
+        (("--auditor", "--days", "0"), "give them in order"),
+        (("--auditor", "--days", "99999999"), "after the year 9999"),
+        (("--auditor", "--first-day", "1950-01-01"), "before 1970"),
+    ],
+)
+def test_a_file_that_cannot_be_issued_is_refused(tmp_path, capsys, options, says):
+    assert keygen(tmp_path, "--preset", "robomaster-fleet") == 0
+    assert main(["issue", "--master", str(tmp_path / "robot.key"), *options, "--out", str(tmp_path / "a.key")]) == 1
+    assert says in capsys.readouterr().err
+    assert not (tmp_path / "a.key").exists()
+
+
+def test_only_a_master_issues(tmp_path, capsys):
+    assert keygen(tmp_path, "--preset", "paper-robomaster-fleet") == 0
+    assert main(["issue", "--master", str(tmp_path / "robot.key"), "--auditor", "--out", str(tmp_path / "a.key")]) == 1
+    assert "is no master but of format 1" in capsys.readouterr().err
+
+
+def test_a_revoked_or_expired_robot_does_not_run(tmp_path, config, capsys):
+    assert keygen(tmp_path, "--preset", "robomaster-fleet", "--first-day", "2026-01-01", "--days", "36500") == 0
+    issue = ["issue", "--master", str(tmp_path / "robot.key"), "--channel", "robot1", "--out"]
+    assert main([*issue, str(tmp_path / "old.key"), "--first-day", "2026-01-01", "--days", "1"]) == 0
+    assert main([*issue, str(tmp_path / "r1.key"), "--not-after", "2026-01-02T00:00:00Z"]) == 0
+    assert main([*issue, str(tmp_path / "stolen.key")]) == 0
+    serial = load_key(tmp_path / "stolen.key").holding.grant.serial
+    revoked = str(tmp_path / "fleet.revoked")
+    assert main(["revoke", "--list", revoked, "--serial", serial, "--channel", "robot1"]) == 0
+    run = ["run", "--config", str(config), "--message", "5", "--allow-unsynchronised", "--revoked", revoked, "--key"]
+    for name, says in (
+        ("old", "is for days up to 2026-01-01"),
+        ("r1", "expired on 2026-01-02"),
+        ("stolen", "was revoked"),
+    ):
+        capsys.readouterr()
+        assert main([*run, str(tmp_path / f"{name}.key")]) == 1
+        assert says in capsys.readouterr().err
+
+
 def test_an_integer_s_size_is_in_bits(tmp_path):
-    assert keygen(tmp_path, "--preset", "robomaster-fleet", "--payload", "integer:5") == 0
+    assert keygen(tmp_path, "--preset", "paper-robomaster-fleet", "--payload", "integer:5") == 0
     assert load_key(tmp_path / "robot.key").scheme.framing == Framing("integer", 5)
 
 
@@ -76,7 +176,7 @@ def test_an_integer_s_size_is_in_bits(tmp_path):
 )
 def test_a_framing_that_cannot_be_writes_no_key(tmp_path, capsys, options, code, says):
     try:
-        ended = keygen(tmp_path, "--preset", "robomaster-fleet", *options)
+        ended = keygen(tmp_path, "--preset", "paper-robomaster-fleet", *options)
     except SystemExit as leaving:
         ended = leaving.code
     assert ended == code

@@ -34,7 +34,8 @@ def robot(tmp_path, monkeypatch):
     monkeypatch.setattr("mtm_onboard.doctor.examination.is_synchronised", lambda: True)
     monkeypatch.setattr("mtm_onboard.doctor.examination.check_loop", watched)
     assert (
-        main(["keygen", "--id", "fake-key", "--out", str(tmp_path / "robot.key"), "--preset", "robomaster-fleet"]) == 0
+        main(["keygen", "--id", "fake-key", "--out", str(tmp_path / "robot.key"), "--preset", "paper-robomaster-fleet"])
+        == 0
     )
     configure(tmp_path)
     return tmp_path

@@ -50,7 +50,7 @@ def test_keygen_provisions_the_scheme_of_a_file(written, tmp_path):
 
 
 def test_keygen_takes_a_scheme_file_or_options_and_not_both(written, tmp_path, capsys):
-    for option in (["--alphabet", "8"], ["--preset", "robomaster-fleet"]):
+    for option in (["--alphabet", "8"], ["--preset", "paper-robomaster-fleet"]):
         with pytest.raises(SystemExit) as left:
             main(["keygen", "--id", "a", "--scheme", str(written), "--out", str(tmp_path / "robot.key"), *option])
         assert left.value.code == 2

@@ -5,7 +5,7 @@ from hil.experiments.detectors.linear_genie import (
     GenieKnowledge,
     axis_motion,
     fit_interference,
-    genie_symbols,
+    genie_scores,
     moved_by_responses,
 )
 from hil.experiments.real.added import with_message
@@ -31,6 +31,10 @@ def sending(axes, symbols=(5,), sigma=0.05):
 def knowledge(silent, played, responses):
     motion = axis_motion(silent, played.channel.axes, 4.0, body=True)
     return GenieKnowledge(moved_by_responses(played, responses), tuple(fit_interference([motion], a) for a in (0, 1)))
+
+
+def genie_symbols(*given):
+    return np.argmax(genie_scores(*given), axis=1)
 
 
 @pytest.mark.parametrize("axes", [("vx", "vy"), ("vx", "wz")])

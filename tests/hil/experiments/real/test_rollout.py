@@ -37,6 +37,7 @@ def test_a_loud_message_is_decoded_and_every_window_right(tmp_path):
     assert result["bits"] > 13.3
     assert result["windows"] in (6, 7)
     assert result["genie"] == result["windows"]
+    assert result["genie_sure"] is True
     assert result["matched"] >= result["windows"] - 1
 
 
@@ -45,6 +46,7 @@ def test_a_silent_recording_is_absent(tmp_path):
     result = read_real({**written(tmp_path, spinning_track()), **job_parameters(job)}, 2)
     assert result["verdict"] == "absent"
     assert result["genie"] < result["windows"]
+    assert result["genie_sure"] is False
 
 
 def test_a_job_survives_as_the_parameters_of_a_cell():

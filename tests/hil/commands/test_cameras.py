@@ -1,0 +1,23 @@
+from io import StringIO
+
+from rich.console import Console
+
+from hil.commands import cameras
+from hil.experiments.cameras.filmed import CONDITIONS
+
+
+def pretended(parameters, seed):
+    return {"bits": 200.0 - float(parameters["shake_px"]), "right": True, "seen": 1.0}
+
+
+def test_the_table_is_printed_and_written(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(cameras, "film_and_decode", pretended)
+    out = tmp_path / "cameras.csv"
+    cameras.cameras(1, 5, 1, out, tmp_path / "cells.jsonl", Console(file=StringIO()))
+    printed = capsys.readouterr().out
+    assert "shake, floor carpet, 10 px, pan 0, roll 0 degrees: 190 bits, 95 %, 1 of 1 messages right" in printed
+    assert "markers at 45 degrees: 200 bits, 100 %, 1 of 1 messages right" in printed
+    lines = out.read_text().splitlines()
+    assert lines[0] == f"# mtm-hil cameras -n 1 --seed 5 --out {out}"
+    assert lines[1].startswith("# code ")
+    assert len(lines) == 3 + len(CONDITIONS)
