@@ -63,6 +63,8 @@ class BackgroundFollower:
 
     def look(self, frame: Frame) -> None:
         """Find the background's points in the next frame."""
+        if self.times_s and frame.size != self.size:
+            return  # the tracker refuses such a film
         self.times_s.append(frame.time_s)
         self.size = frame.size
         if not self.is_needed:
