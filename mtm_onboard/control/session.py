@@ -221,8 +221,7 @@ def run_session(
         with _long_lived_objects_uncollected():
             place_threads(service.thread)
             manager.ready()
-            step = runtime.step if watch is None else _watched(runtime, watch)
-            run_loop(clock, rate_hz, step, start_s=start_s, stop=ending, stats=stats)
+            run_loop(clock, rate_hz, runtime.step, start_s=start_s, stop=ending, stats=stats)
         if service.error is not None:
             raise MtmError(f"the robot's link failed ({service.error}); check the link") from service.error
     return Outcome(
@@ -258,17 +257,6 @@ def start_of(plan: Plan, scheme: Scheme, now_unix_s: float, last_slot: int = -1)
         return wanted_unix_s, 0
     slot = max(next_slot(max(wanted_unix_s, now_unix_s + _LEAD_S), scheme), last_slot + 1)
     return slot_start_unix_s(slot, scheme), slot
-
-
-def _watched(runtime: Runtime, watch: SlotWatch) -> Callable[[int, float, float], bool]:
-    run, after_tick = runtime.step, watch.after_tick
-
-    def step(tick: int, now_s: float, late_s: float) -> bool:
-        has_sent = run(tick, now_s, late_s)
-        after_tick(tick)
-        return has_sent
-
-    return step
 
 
 def _lateness_sentence(
