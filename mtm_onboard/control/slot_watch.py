@@ -136,7 +136,12 @@ class SlotWatch:
         scheme, former = self._scheme, self.playing
         now_unix_s = self._clock.now() + offset_s
         slot = max(next_slot(now_unix_s + _LEAD_S, scheme), self._played + 1)
-        modulator = self._play(former.modulator.waiting or former.modulator.message, slot)
+        try:
+            modulator = self._play(former.modulator.waiting or former.modulator.message, slot)
+        except MtmError as error:
+            # Such as a day that the key is not for; the time may be set once more.
+            self._tell_once(tick, f"{_set(step_s)}: no noise ({error})")
+            return
         start_unix_s = slot_start_unix_s(slot, scheme)
         first_tick = math.ceil((start_unix_s - offset_s - self._start_s) * scheme.rate_hz - 0.5)
         self._offset_s, self._waiting = offset_s, False
@@ -145,6 +150,10 @@ class SlotWatch:
         )
         self._runtime.play(modulator, first_tick)
         self._tell(tick, f"{_set(step_s)}: the message begins anew at {utc(start_unix_s)}, slot {slot}")
+
+    def _tell_once(self, tick: int, sentence: str) -> None:
+        if sentence != self.doubt:
+            self._tell(tick, sentence)
 
     def _tell(self, tick: int, sentence: str) -> None:
         self.doubt = sentence
