@@ -63,6 +63,7 @@ def identify(options: IdentifyOptions, console: Console) -> None:
         run = logged_run(read_commands(commands, options.offset_s), read_truth(truth), RATE_HZ)
         runs.append((commands.stem, measured_axes(run, commands)))
     console.print(_table(runs))
+    _mention_feedback(runs)
     command = _command(options)
     if options.plant is not None:
         save_plant(_plant(runs, options), options.plant, [*provenance(command), *_figures(runs)])
@@ -72,6 +73,16 @@ def identify(options: IdentifyOptions, console: Console) -> None:
     if options.out is not None:
         write_result_csv(options.out, command, _COLUMNS, [_row(name, axis) for name, axes in runs for axis in axes])
         print(f"wrote {options.out}")
+
+
+def _mention_feedback(runs: Sequence[tuple[str, Sequence[MeasuredAxis]]]) -> None:
+    for name, axes in runs:
+        for axis in axes:
+            if phase_delay_s(axis.spectra) < 0.0:
+                print(
+                    f"{name}, {axis.name}: the motion comes before its commands, so that these answer it, as those of "
+                    "a held heading do, or the clocks differ; do not use this axis"
+                )
 
 
 def measured_axes(run: LoggedRun, commands: Path) -> list[MeasuredAxis]:

@@ -96,16 +96,19 @@ def _drive(
     poses, times_s = array("d"), array("d")
     last = -1
 
+    def keep(time_s: float) -> None:
+        times_s.append(time_s)
+        for robot in robots:
+            poses.extend((*robot.plant.position_xy_m, robot.plant.heading_rad))
+
     def step(tick: int, now_s: float, _late_s: float) -> None:
         nonlocal last
         since_s = now_s - began_s
         for robot in robots:
             robot.poll(since_s)
-        if tick * SAMPLE_PERIOD_S <= settings.seconds + 1e-6:
+        if tick > 0 and tick * SAMPLE_PERIOD_S <= settings.seconds + 1e-6:
             # The chassis stands where its last whole step, that of this tick, has brought it.
-            times_s.append(tick * SAMPLE_PERIOD_S)
-            for robot in robots:
-                poses.extend((*robot.plant.position_xy_m, robot.plant.heading_rad))
+            keep(tick * SAMPLE_PERIOD_S)
         if tick // _POLLS_PER_COMMAND > last // _POLLS_PER_COMMAND:
             for robot in robots:
                 robot.command()
@@ -120,6 +123,8 @@ def _drive(
             after_s > 0.0 and not any(robot.process.is_running for robot in robots)
         )
 
+    # The loop comes late to its first ticks, and a recording without its beginning would move the message's start.
+    keep(0.0)
     run_loop(clock, 1.0 / SAMPLE_PERIOD_S, step, start_s=began_s, stop=ended)
     return poses, times_s
 

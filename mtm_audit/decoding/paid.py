@@ -34,6 +34,6 @@ def _dearer(comparison: DecoyComparison, choices: int) -> DecoyComparison:
     return replace(comparison, p_value=min(1.0, choices * comparison.p_value))
 
 
-def worth(decoding: Decoding) -> tuple[bool, float]:
-    """What makes one try better than another: that there is a message, and then the evidence."""
-    return decoding.verdict != "absent", decoding.evidence.bits
+def worth(decoding: Decoding) -> tuple[bool, bool, float]:
+    """What makes one try better than another: that it is decoded, that there is a message, and then the evidence."""
+    return decoding.verdict == "decoded", decoding.verdict != "absent", decoding.evidence.bits

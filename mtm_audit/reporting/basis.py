@@ -1,5 +1,6 @@
 """What a verdict rests on beside its evidence: schedule, kind of key, when a day's key became public, revocations."""
 
+import math
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -44,6 +45,13 @@ def basis_of(decoding: Decoding, grant: Grant | None, disclosure: Disclosure | N
     if disclosure is not None:
         sentence, authenticates = _disclosed(disclosure)
         sentences.append(sentence)
+    unheard = _unheard_channels(decoding) if grant is not None else ()
+    if unheard and decoding.frames:
+        authenticates = False
+        sentences.append(
+            f"Not authenticated: {', '.join(unheard)} shows nothing of its own, and the code filled in its part, so "
+            "who holds the files of the others alone could have made this motion."
+        )
     revoked = _revoked_channels(decoding)
     if revoked:
         authenticates = False
@@ -81,6 +89,15 @@ def _disclosed(disclosure: Disclosure) -> tuple[str, bool]:
         f"this copy was last written on {written}. So it proves nothing by itself.",
         False,
     )
+
+
+def _unheard_channels(decoding: Decoding) -> tuple[str, ...]:
+    """Channels with a part of the message of their own whose motion does not show it; none where all say the same."""
+    scheme = decoding.scheme
+    if scheme.combine == "same":
+        return ()
+    needed_nats = math.log(1.0 / decoding.settings.threshold)
+    return tuple(item.channel.name for item in decoding.channels if item.nats is None or item.nats < needed_nats)
 
 
 def _revoked_channels(decoding: Decoding) -> tuple[str, ...]:

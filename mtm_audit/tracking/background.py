@@ -24,6 +24,7 @@ LEAST_POINTS = 12
 LEAST_SHARE = 0.5  # of a key picture's points; with fewer in sight a new key picture is taken
 # A camera that was still for so long is looked at now and then, until it moves by so much.
 STILL_S, GLANCE_S, STILL_PX = 0.3, 0.1, 0.15
+RETRY_S = 2.0  # after which a background is looked for again where there was none
 FEW = 20  # points that tell whether it does
 
 
@@ -62,11 +63,18 @@ class BackgroundFollower:
 
     def look(self, frame: Frame) -> None:
         """Find the background's points in the next frame."""
+        if self.times_s and frame.size != self.size:
+            return  # the tracker refuses such a film
         self.times_s.append(frame.time_s)
         self.size = frame.size
         if not self.is_needed:
             return
-        is_still = self._looked_s - self._moved_s > STILL_S
+        if self.keys and len(self.keys[-1].points) < LEAST_POINTS:
+            if len(self.keys) > 1 or frame.time_s - self._looked_s < RETRY_S:
+                return
+            # So far there was nothing to see, as in a film that begins in the dark.
+            self.keys, self.looks = [], []
+        is_still = bool(self.keys) and self._looked_s - self._moved_s > STILL_S
         if is_still and frame.time_s - self._looked_s < GLANCE_S:
             return
         if is_still and frame.image.ndim == 2 and self._is_where_it_was(frame.image):
@@ -91,6 +99,8 @@ class BackgroundFollower:
         return len(off_px) >= FEW // 2 and float(np.median(off_px)) < STILL_PX
 
     def _take_key(self, image: Image, to_first: Floats, time_s: float) -> None:
+        if self.keys:  # nothing is looked for in the picture before any more, and a long pan has many
+            self.keys[-1] = replace(self.keys[-1], image=np.empty((0, 0), np.uint8))
         self.keys.append(Key(len(self.times_s) - 1, image.copy(), _good_points(image), to_first))
         self._motion = np.eye(3)
         places = self.keys[-1].points.astype(np.float32)
@@ -99,8 +109,6 @@ class BackgroundFollower:
 
     def _find(self, image: Image, coarse: Image, time_s: float) -> None:
         key = self.keys[-1]
-        if len(key.points) < LEAST_POINTS:
-            return
         expected = self._coarse_step(coarse) @ self._motion
         places = _places(key, image, expected)
         found = np.isfinite(places[:, 0])

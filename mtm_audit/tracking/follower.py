@@ -111,12 +111,16 @@ class MarkerFollower:
     def _nearby(self, image: Image, time_s: float, except_for: dict[Copy, Sighting]) -> dict[Copy, Sighting]:
         """The other followed markers that are read where they are expected."""
         found: dict[Copy, Sighting] = {}
-        for copy, last in self._followed.items():
+        # What was seen last comes first: a copy that is lost may not claim another that passes its place.
+        for copy, last in sorted(self._followed.items(), key=lambda item: -item[1].seen_s):
             if copy in except_for:
                 continue
             if time_s - last.seen_s <= NEARBY_S or last.seen_s == self._last_s:
                 sighting = self._finder.near(image, copy[0], last.expected(lost=last.seen_s < self._last_s))
-                if sighting is not None and last.gap_sides(sighting) < self._reach_sides(last, time_s):
+                taken = [*except_for.values(), *found.values()]
+                if sighting is None or any(_is_there(one, sighting) for one in taken):
+                    continue
+                if last.gap_sides(sighting) < self._reach_sides(last, time_s):
                     found[copy] = sighting
         return found
 
@@ -124,12 +128,14 @@ class MarkerFollower:
         since_s = time_s - self._searched_s
         if not self._followed or since_s >= FULL_SEARCH_EVERY_S:
             return True
-        lost_s = [
-            time_s - last.seen_s
-            for copy, last in self._followed.items()
-            if copy not in found and last.count >= SEEN_AT_LEAST
-        ]
-        return any(since_s >= PATIENCE * (lost - AT_ONCE_S) for lost in lost_s)
+        lost = [last for copy, last in self._followed.items() if copy not in found]
+        for last in lost:
+            lost_s = time_s - last.seen_s
+            # A chance reading is looked for no longer than at once; a marker that came in fast is found by that.
+            is_waited_for = last.count >= SEEN_AT_LEAST or lost_s <= AT_ONCE_S
+            if is_waited_for and since_s >= PATIENCE * (lost_s - AT_ONCE_S):
+                return True
+        return False
 
     def _add_new(self, sightings: list[Sighting], found: dict[Copy, Sighting], time_s: float) -> None:
         """Give each sighting that is not among the `found` to the copy it continues, or make it a new one."""

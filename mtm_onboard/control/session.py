@@ -152,8 +152,7 @@ def run_session(
         now_s, now_unix_s = clock.now(), wall.unix_s()
         last_slot = -1 if ledger is None else ledger.last_slot
         start_unix_s, first_slot = start_of(plan, key.scheme, now_unix_s, last_slot)
-        _check_span(key, first_slot)
-        modulator = Modulator(key.codebook(first_slot), channel.name, played, repeat=plan.repeat)
+        modulator = _planned(key, channel.name, plan, played, first_slot)
         start_s = now_s + start_unix_s - now_unix_s
         journal = None
         if config.journal is not None:
@@ -178,7 +177,7 @@ def run_session(
         if rolling:
             watch = SlotWatch(
                 playing, scheme=key.scheme, runtime=runtime, clock=clock, wall=wall, start_s=start_s, ledger=ledger,
-                play=lambda message, slot: Modulator(key.codebook(slot), channel.name, message, repeat=plan.repeat),
+                play=lambda message, slot: _planned(key, channel.name, plan, message, slot),
                 is_trusted=lambda: plan.allow_unsynchronised or wall.is_synchronised() is True,
                 note=journal.note if journal is not None else _say_nowhere,
                 threaded=ends is None or ends.wall is None,
@@ -221,8 +220,7 @@ def run_session(
         with _long_lived_objects_uncollected():
             place_threads(service.thread)
             manager.ready()
-            step = runtime.step if watch is None else _watched(runtime, watch)
-            run_loop(clock, rate_hz, step, start_s=start_s, stop=ending, stats=stats)
+            run_loop(clock, rate_hz, runtime.step, start_s=start_s, stop=ending, stats=stats)
         if service.error is not None:
             raise MtmError(f"the robot's link failed ({service.error}); check the link") from service.error
     return Outcome(
@@ -258,17 +256,6 @@ def start_of(plan: Plan, scheme: Scheme, now_unix_s: float, last_slot: int = -1)
         return wanted_unix_s, 0
     slot = max(next_slot(max(wanted_unix_s, now_unix_s + _LEAD_S), scheme), last_slot + 1)
     return slot_start_unix_s(slot, scheme), slot
-
-
-def _watched(runtime: Runtime, watch: SlotWatch) -> Callable[[int, float, float], bool]:
-    run, after_tick = runtime.step, watch.after_tick
-
-    def step(tick: int, now_s: float, late_s: float) -> bool:
-        has_sent = run(tick, now_s, late_s)
-        after_tick(tick)
-        return has_sent
-
-    return step
 
 
 def _lateness_sentence(
@@ -330,13 +317,15 @@ def _check_start(plan: Plan, now_unix_s: float, *, rolling: bool) -> None:
         )
 
 
-def _check_span(key: Key, first_slot: int) -> None:
+def _planned(key: Key, channel_name: str, plan: Plan, played: Played, first_slot: int) -> Modulator:
+    """What plays a message from a slot on; raises MtmError when the key is not for that slot."""
     grant = key.holding.grant
     if grant is not None and first_slot > grant.last_slot(key.scheme):
         raise MtmError(
             f"this key file is for days up to {grant.last_day}, and the message would begin after its last slot; have "
             "one issued for the days to come"
         )
+    return Modulator(key.codebook(first_slot), channel_name, played, repeat=plan.repeat)
 
 
 def _modulator(key: Key, channel_name: str, plan: Plan, first_slot: int) -> Modulator:

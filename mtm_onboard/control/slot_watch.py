@@ -72,28 +72,18 @@ class SlotWatch:
         self._play, self._is_trusted, self._note = play, is_trusted, note
         self._offset_s = playing.start_unix_s - start_s
         self._look_ticks = max(1, math.ceil(_LOOK_S * scheme.rate_hz))
-        self._next_look = -math.inf
         self._waiting = False
         # Slots that were played before this plan, and what the writing thread is to keep, and has kept.
         self._played = -1 if ledger is None else ledger.last_slot
-        self._wanted = self._kept = self._runtime_kept = self._played
+        self._wanted = self._kept = self._played
         self._fault = ""
-        self._tick = -1
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="slots", daemon=True) if threaded else None
         if ledger is not None:
             ledger.reserve(playing.first_slot)
             self._kept = ledger.last_slot
         self._allow()
-
-    def after_tick(self, tick: int) -> None:
-        """Call it after each tick's command has left: mostly two comparisons."""
-        self._tick = tick
-        if tick >= self._next_look:
-            self._next_look = tick + self._look_ticks
-            self._look(tick)
-        if self._kept != self._runtime_kept:
-            self._allow()
+        runtime.watch(self._look)
 
     def plays(self, tick: int) -> bool:
         """Whether there is noise at this tick when all is well."""
@@ -115,44 +105,55 @@ class SlotWatch:
             # The slots that were kept ahead are free for the next run, which begins where this one ended.
             # A disk that does not take this has them as played, which does no harm.
             with suppress(MtmError):
-                self._ledger.release(self._slot_begun())
+                self._ledger.release(self._slot_begun(self._tick_now()))
 
-    def _look(self, tick: int) -> None:
-        """Compare the clocks, make a new plan when it is time, and have the coming slots kept."""
+    def _look(self, tick: int) -> int:
+        """Compare the clocks, make a new plan when it is time, and have the coming slots kept; the next look's tick."""
         offset_s = self._measured_offset_s()
-        if offset_s is None:
-            return
+        if offset_s is not None:
+            self._compare(tick, offset_s)
+        if not self._waiting:
+            part = self.playing
+            ahead = tick + math.ceil(_AHEAD_S * self._scheme.rate_hz) - part.first_tick
+            self._wanted = part.first_slot + max(0, ahead // self._scheme.message_ticks)
+            if self._thread is None:
+                self._keep()
+            self._allow()
+        # Soon again while the disk has not answered.
+        return tick + (self._look_ticks if self._kept >= self._wanted else max(1, self._look_ticks // 10))
+
+    def _compare(self, tick: int, offset_s: float) -> None:
         step_s = offset_s - self._offset_s
         if not self._waiting and abs(step_s) >= SMALLEST_STEP_S:
-            self._played = self._slot_begun()
+            self._played = self._slot_begun(tick)
             self._waiting = True
             self._runtime.noise_until_tick = -math.inf
             self._tell(tick, f"{_set(step_s)}: no noise until it is known to be right")
-        if self._waiting:
-            if not self._is_trusted():
-                return
+        if self._waiting and self._is_trusted():
             self._plan_anew(tick, offset_s, step_s)
-        part = self.playing
-        ahead = tick + math.ceil(_AHEAD_S * self._scheme.rate_hz) - part.first_tick
-        self._wanted = part.first_slot + max(0, ahead // self._scheme.message_ticks)
-        if self._thread is None:
-            self._keep()
 
     def _plan_anew(self, tick: int, offset_s: float, step_s: float) -> None:
         scheme, former = self._scheme, self.playing
         now_unix_s = self._clock.now() + offset_s
         slot = max(next_slot(now_unix_s + _LEAD_S, scheme), self._played + 1)
-        modulator = self._play(former.modulator.waiting or former.modulator.message, slot)
+        try:
+            modulator = self._play(former.modulator.waiting or former.modulator.message, slot)
+        except MtmError as error:
+            # Such as a day that the key is not for; the time may be set once more.
+            self._tell_once(tick, f"{_set(step_s)}: no noise ({error})")
+            return
         start_unix_s = slot_start_unix_s(slot, scheme)
         first_tick = math.ceil((start_unix_s - offset_s - self._start_s) * scheme.rate_hz - 0.5)
         self._offset_s, self._waiting = offset_s, False
         self.playing = Playing(
             modulator=modulator, first_tick=first_tick, first_slot=slot, start_unix_s=self._start_s + offset_s
         )
-        self._runtime.noise_until_tick = -math.inf
         self._runtime.play(modulator, first_tick)
-        self._allow()
         self._tell(tick, f"{_set(step_s)}: the message begins anew at {utc(start_unix_s)}, slot {slot}")
+
+    def _tell_once(self, tick: int, sentence: str) -> None:
+        if sentence != self.doubt:
+            self._tell(tick, sentence)
 
     def _tell(self, tick: int, sentence: str) -> None:
         self.doubt = sentence
@@ -168,21 +169,21 @@ class SlotWatch:
                 return unix_s - 0.5 * (before_s + after_s)
         return None
 
-    def _slot_begun(self) -> int:
-        """The last slot of which anything may have been played, in this plan or before."""
+    def _tick_now(self) -> int:
+        return math.floor((self._clock.now() - self._start_s) * self._scheme.rate_hz)
+
+    def _slot_begun(self, tick: int) -> int:
+        """The last slot of which anything may have been played up to a tick, in this plan or before."""
         part = self.playing
-        ticks = self._tick - part.first_tick
+        ticks = tick - part.first_tick
         if self._waiting or ticks < 0:
             return self._played
         return max(self._played, part.first_slot + ticks // self._scheme.message_ticks)
 
     def _allow(self) -> None:
         """Let noise be played up to the end of the last slot that the disk has."""
-        self._runtime_kept = kept = self._kept
-        if self._waiting:
-            return
         part = self.playing
-        slots = math.inf if self._ledger is None else kept - part.first_slot + 1
+        slots = math.inf if self._ledger is None else self._kept - part.first_slot + 1
         self._runtime.noise_until_tick = part.first_tick + max(0, slots) * self._scheme.message_ticks
 
     def _keep(self) -> None:
@@ -194,7 +195,9 @@ class SlotWatch:
         except MtmError as error:
             if str(error) != self._fault:
                 self._fault = str(error)
-                self._tell(self._tick, f"{error}: the noise ends, since nobody would know which slots were played")
+                self._tell(
+                    self._tick_now(), f"{error}: the noise ends, since nobody would know which slots were played"
+                )
             return
         self._fault = ""
         self._kept = ledger.last_slot

@@ -1,6 +1,7 @@
 """The runtime: what happens in one tick, from the newest base command to the robot."""
 
 import math
+from collections.abc import Callable
 from typing import Protocol
 
 from mtm_onboard.journal.journal import Journal
@@ -12,6 +13,10 @@ from mtm_onboard.protocol.journal_file import PlayedSlot
 from mtm_onboard.runtime.guard import Guard
 from mtm_onboard.runtime.modulator import Modulator
 from mtm_onboard.runtime.source import Source
+
+
+def _never(tick: int) -> float:
+    return math.inf
 
 
 class NoiseAdder(Protocol):
@@ -47,8 +52,6 @@ class Runtime:
         if modulator is not None:
             modulator.require_body_axes()
         self.link_losses = self.link_degradations = 0
-        # From this tick on there is no noise, whatever the modulator would play.
-        self.noise_until_tick: float = math.inf
         self._up_since_s: float | None = -math.inf
         self._after_s = -math.inf
         self._degraded = ""
@@ -58,15 +61,29 @@ class Runtime:
         self._stop_noted = False
         self._modulator = modulator
         self._first_tick = 0
-        self._next_slot_tick = -math.inf
+        # From this tick on there is no noise, whatever the modulator would play; set from the loop's thread.
+        self.noise_until_tick: float = math.inf
+        # What is not done in each tick: the journal's slots, and what somebody watches. One comparison for both.
+        self._next_slot_tick = self._next_extra_tick = -math.inf
+        self._next_look_tick = math.inf
+        self._look: Callable[[int], float] = _never
         self._guard = guard
         self._source = source
         self._link = link
         self._journal = journal
 
     def play(self, modulator: NoiseAdder, first_tick: int) -> None:
-        """Have another modulator's tick 0 at `first_tick`, from the next step on; from the loop's thread."""
+        """Have another modulator's tick 0 at `first_tick`, from the next step on; from the loop's thread.
+
+        It is not heard before `noise_until_tick` is set.
+        """
         self._modulator, self._first_tick, self._next_slot_tick = modulator, first_tick, first_tick
+        self.noise_until_tick = self._next_extra_tick = -math.inf
+
+    def watch(self, look: Callable[[int], float]) -> None:
+        """Have `look(tick)` called after the next tick's send, and then from the tick on that it answers."""
+        self._look = look
+        self._next_look_tick = self._next_extra_tick = -math.inf
 
     def step(self, tick: int, now_s: float, late_s: float = 0.0) -> bool:
         """Whether one command left: newest base, guard, noise, limits, send; journal and next window come after.
@@ -87,11 +104,10 @@ class Runtime:
         if link.degraded != self._degraded:
             self._follow_doubts(tick, link.degraded)
         base = guard.admit(velocity, arrived_s, now_s, after_s=self._after_s)
-        own_tick = tick - self._first_tick
-        if modulator is None or not guard.noise_allowed or tick >= self.noise_until_tick:
+        if modulator is None or tick >= self.noise_until_tick or not guard.noise_allowed:
             wanted = base
         else:
-            wanted = modulator.add(own_tick, base)
+            wanted = modulator.add(tick - self._first_tick, base)
         sent = guard.limit(base, wanted)
         try:
             link.send(sent)
@@ -106,14 +122,21 @@ class Runtime:
             guard.not_sent()
         self._record(tick, now_s, late_s, base, sent)
         if modulator is not None:
-            modulator.prepare(own_tick)
-        if tick >= self._next_slot_tick:
-            self._follow_slots(tick)
+            modulator.prepare(tick - self._first_tick)
+        if tick >= self._next_extra_tick:
+            self._do_extras(tick)
         return has_left
 
     def _record(self, tick: int, now_s: float, late_s: float, base: BodyVelocity, sent: BodyVelocity) -> None:
         if self._journal is not None:
             self._journal.append(tick, now_s, base, sent, self._guard.flags, late_s)
+
+    def _do_extras(self, tick: int) -> None:
+        if tick >= self._next_look_tick:
+            self._next_look_tick = self._look(tick)
+        if tick >= self._next_slot_tick:
+            self._follow_slots(tick)
+        self._next_extra_tick = min(self._next_look_tick, self._next_slot_tick)
 
     def _follow_slots(self, tick: int) -> None:
         """The journal is told once a slot what is played, where it does not say it tick by tick."""

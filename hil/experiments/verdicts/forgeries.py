@@ -18,6 +18,7 @@ from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.track import Track
+from mtm_audit.reporting.basis import basis_of
 from mtm_onboard.protocol import Channel, Codebook, Key, MtmError, Scheme
 from mtm_onboard.protocol.framing import Framing, channel_symbols
 from mtm_onboard.protocol.holding import DayHolding, epoch_of_day
@@ -122,7 +123,9 @@ def one_try(attack: str, seed: int) -> tuple[str, ...]:
         decoding = decode_tracks(tracks, auditor, DecodeSettings(at=RecordedAt(film.began_unix_s, ERROR_S)))
     except MtmError:
         return ("refused",)
-    authentic = decoding.verdict == "decoded" and decoding.frames[-1].message.authenticated
+    held = decoding.verdict == "decoded" and decoding.frames[-1].message.authenticated
+    # What the report calls authenticated, which also asks whether each robot was heard.
+    authentic = held and basis_of(decoding, auditor.holding.grant, None).authenticates
     return (decoding.verdict, "authenticated") if authentic else (decoding.verdict,)
 
 

@@ -17,7 +17,13 @@ def test_honest_robots_are_authenticated():
 @pytest.mark.parametrize("attack", ATTACKS)
 @pytest.mark.parametrize("seed", range(2))
 def test_a_forgery_is_not_authenticated(attack, seed):
-    assert "decoded" not in one_try(attack, seed)
+    assert "authenticated" not in one_try(attack, seed)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_robot_whose_part_the_code_fills_in_is_not_vouched_for(seed):
+    # The code may fill in what another robot would have said; the report then does not call it authenticated.
+    assert "authenticated" not in one_try("one robot as another", seed)
 
 
 def test_cells_hold_every_attack_and_the_control():

@@ -9,6 +9,8 @@ from mtm_audit.decoding.paid import paid_for
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.decoding.speeds import SPEEDS, at_speed, decode_at_speeds, played
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.framing import Framing
+from mtm_onboard.runtime.message import message_of
 from tests.audit.moving_robot import OTHER_SECRET, key_of, robot_track, scheme_of
 
 KEY = key_of(scheme_of(symbols=(1, 1), ticks=200))
@@ -68,7 +70,18 @@ def test_a_search_that_costs_too_much_takes_the_verdict_back(decoding):
     assert doubtful.message is None
 
 
-def test_comparisons_with_decoys_and_checks_of_frames_pay_too():
+def test_the_checks_of_a_frame_count_for_every_speed():
+    framing = Framing("integer", 12, check="tag", check_bits=16, code="reed-solomon")
+    key = key_of(scheme_of(symbols=(5, 5), ticks=500, alphabet=16, framing=framing))
+    message = message_of(1234, key)
+    sent = [robot_track(key, f"robot{number}", message, 22.0, onset_s=1.0, seed=number) for number in range(2)]
+    framed = decode_tracks(sent, key, DecodeSettings(onset_s=1.0))
+    paid = paid_for(framed, 15)
+    assert (paid.verdict, paid.message) == ("decoded", 1234)
+    assert paid.frames[0].message.false_acceptance == pytest.approx(15 * framed.frames[0].message.false_acceptance)
+
+
+def test_a_comparison_with_decoys_pays_too():
     framed = key_of(scheme_of(symbols=(1,), ticks=200))
     track = robot_track(framed, "robot0", None, 9.0, rate_hz=50.0)
     coherency = decode_tracks([track], framed, DecodeSettings(detector="coherency", onset_s=0.5, decoys=8))

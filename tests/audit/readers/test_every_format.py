@@ -6,9 +6,10 @@ import pytest
 import mtm_audit
 from mtm_audit.readers.logs.opening import opening_of
 from mtm_audit.readers.logs.registry import format_of, read_log
+from mtm_onboard.protocol.slots import slot_at, slot_start_unix_s
 from tests.audit.moving_robot import key_of, robot_track, scheme_of
 from tests.audit.readers.every_format import ALL, FROM_MARKERS
-from tests.audit.readers.moving_pose import driving, pose_of
+from tests.audit.readers.moving_pose import UNIX_S, driving, pose_of
 
 # What single precision and a few digits leave.
 CLOSE_M = 2e-5
@@ -66,3 +67,21 @@ def test_a_message_decodes_alike_from_every_format(tmp_path, message, name):
     decoding = mtm_audit.decode(ALL[name](tmp_path, pose), key)
     assert (decoding.verdict, decoding.symbols) == ("decoded", (3,))
     assert decoding.evidence.nats == pytest.approx(reference.evidence.nats, rel=0.02)
+
+
+@pytest.fixture(scope="module")
+def rolling():
+    """A key whose waveforms change with time, and a robot that says 3 in the slot that begins the recording."""
+    key = key_of(scheme_of(symbols=(1,), ticks=400, schedule="rolling"))
+    first = slot_at(UNIX_S, key.scheme)
+    assert slot_start_unix_s(first, key.scheme) == UNIX_S
+    return key, pose_of(robot_track(key, "robot0", (3,), 25.0, onset_s=0.0, first_slot=first))
+
+
+@pytest.mark.parametrize(
+    "name", ["euroc", "mrclam", "rostopic", "ulog", "dataflash", "tlog", "rosbag1", "rosbag2 mcap"]
+)
+def test_a_log_that_knows_its_hour_needs_no_other(tmp_path, rolling, name):
+    key, pose = rolling
+    decoding = mtm_audit.decode(ALL[name](tmp_path, pose), key)
+    assert (decoding.verdict, decoding.symbols) == ("decoded", (3,))

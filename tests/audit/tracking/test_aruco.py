@@ -173,3 +173,14 @@ def test_a_film_that_cannot_tell_its_mirror_says_so():
     assert "aruco:4x4_50,mirrored" in warnings[0]
     (track,) = tracker("aruco:4x4_50,mirrored").track(film(moving(sheet("4x4_50", 8, 42)), frames=40))
     assert np.diff(track.positions[:, 0]) == pytest.approx(np.full(39, -3), abs=0.2)
+
+
+def test_a_marker_that_is_fast_from_its_first_frame_on_is_kept():
+    """By more than half its width a frame, so that it is not near where it was when it had been seen once."""
+    picture = sheet("4x4_50", 4, 36)
+    for first in (0, 3):
+        blank = [Frame(number / 30, np.full(SIZE, 120, np.uint8)) for number in range(first)]
+        quick = film((picture, lambda number: 60 + 45 * (number % 5), lambda _: 100), frames=15)
+        shown = [Frame((first + number) / 30, one.image) for number, one in enumerate(quick)]
+        (track,) = tracker("aruco").track([*blank, *shown])
+        assert track.valid[first:].all()

@@ -8,6 +8,7 @@ from mtm_audit.decoding.assignment import assign_tracks
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.track import Track
 from mtm_audit.tracking.background import BackgroundFollower
+from mtm_audit.tracking.background_path import background_path
 from mtm_audit.tracking.camera_path import CameraPath, bridged
 from mtm_audit.tracking.dictionaries import dictionary_of
 from mtm_audit.tracking.reference import reference_path, still_tracks
@@ -147,6 +148,24 @@ def test_a_still_camera_is_looked_through_now_and_then():
     assert 30 < len(looked.looks) < 60
 
 
+def test_a_film_that_begins_in_the_dark_is_stabilised_later():
+    dark = [Frame(number / 30, np.zeros((HEIGHT, WIDTH), np.uint8)) for number in range(75)]
+    shaking = [Frame(2.5 + one.time_s, one.image) for one in film(room(), 6.0, size=120)]
+    looked = BackgroundFollower()
+    for frame in [*dark, *shaking]:
+        looked.look(frame)
+    assert looked.keys[0].row > 75
+    assert len(looked.looks) > 50
+
+
+def test_a_picture_without_anything_has_no_background():
+    frames = [Frame(number / 30, np.full((96, 128), 120, np.uint8)) for number in range(80)]
+    looked = BackgroundFollower()
+    for frame in frames:
+        looked.look(frame)
+    assert background_path(looked, [], flipped=False) is None
+
+
 def tracks_of(places, names):
     times_s = np.arange(len(places)) / 30
     return [
@@ -199,3 +218,30 @@ def test_a_path_carries_headings_along():
         "a", np.arange(3.0), np.ones((3, 2)), np.ones(3, dtype=bool), unit="px", headings_rad=np.array([0.0, 1.0, 2.0])
     )
     assert np.unwrap(path.applied(track).headings_rad) == pytest.approx(np.array([0.0, 1.0, 2.0]) + np.pi / 2)
+
+
+def panning(size=60):
+    """A pan over a room three pictures wide, in which a marker trembles; frames and where it is in the room."""
+    rng = np.random.default_rng(2)
+    ground = 120 + cv2.GaussianBlur(rng.normal(0, 150, (HEIGHT, 3 * WIDTH)).astype(np.float32), (0, 0), 2.0)
+    ground = np.clip(ground, 0, 255).astype(np.uint8)
+    frames, places = [], []
+    for number in range(size):
+        left = 10 * number
+        column = 200 + left + round(15 * np.sin(number / 3))
+        scene = ground[:, left : left + WIDTH].copy()
+        scene[126:174, column - left - 24 : column - left + 24] = sheet(3)
+        frames.append(Frame(number / 30, scene))
+        places.append(column)
+    return frames, np.array(places)
+
+
+def test_a_long_pan_is_taken_out_over_several_key_pictures():
+    frames, places = panning()
+    looked = BackgroundFollower()
+    for frame in frames:
+        looked.look(frame)
+    assert len(looked.keys) > 2
+    track = robot(frames)
+    assert track.valid.all()
+    assert np.std(track.positions[:, 0] - places) < 0.3

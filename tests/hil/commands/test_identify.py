@@ -64,3 +64,10 @@ def test_commands_that_never_change_get_one_sentence(tmp_path, logs, capfd):
     assert "the commands never change" in error
     assert error.count("\n") == 1
     assert not (tmp_path / "a.toml").exists()
+
+
+def test_commands_that_answer_the_motion_are_mentioned(logs, capsys):
+    assert run("identify", *logs[:2], "--offset", 0.6) == 0
+    assert "Robot1_Odometry, vx: the motion comes before its commands" in capsys.readouterr().out
+    assert run("identify", *logs[:2]) == 0
+    assert "comes before" not in capsys.readouterr().out

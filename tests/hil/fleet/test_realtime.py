@@ -97,6 +97,8 @@ def test_four_programs_drive_four_robots_in_real_time(tmp_path, wire):
     assert all(robot.is_stopped and robot.faults == 0 for robot in result.robots), result.robots
     for trajectory in result.trajectories:
         assert settings.start_s < trajectory.times_s[-1] <= settings.seconds
+        # Else the message would not begin where the truth says.
+        assert trajectory.times_s[0] == 0.0
         assert np.ptp(trajectory.positions_xy_m[:, 0]) > 0.3
     for robot in result.robots:
         header = read_journal(folder / f"{robot.name}.csv").header

@@ -3,6 +3,7 @@
 import math
 from contextlib import suppress
 from dataclasses import dataclass
+from datetime import date, timedelta
 
 import pytest
 
@@ -13,6 +14,7 @@ from mtm_onboard.journal.ledger import Ledger
 from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Key, MtmError
+from mtm_onboard.protocol.key import generate_master
 from mtm_onboard.protocol.slots import slot_at
 from mtm_onboard.runtime.config import config_from_table
 from mtm_onboard.runtime.source import Command, Source
@@ -68,6 +70,7 @@ class Day:
 
     folder: object
     began_s: float = 0.0
+    key: Key = KEY
 
     def run(self, seconds: float, ahead_s: float = 0.0, *steps: tuple[float, float], killed: bool = False):
         """One run whose clock is ahead by so much, and is set by `steps`: (seconds since its start, by how much)."""
@@ -96,7 +99,7 @@ class Day:
 
         path = None
         with suppress(PowerCutError):
-            path = run_session(config, KEY, Plan(7), ended, ends, said.append).journal.path
+            path = run_session(config, self.key, Plan(7), ended, ends, said.append).journal.path
         self.began_s += seconds
         events = [] if path is None else [event.text for event in read_journal(path).events]
         return link.noise, events, said
@@ -217,6 +220,32 @@ def test_a_step_waits_until_the_clock_is_trusted(day, monkeypatch):
     assert any(unix_s > NOON_UNIX_S + HOUR_S + 34.0 for unix_s, _ in noise)
     assert len(told(events)) == 2
     assert wall["asked"] > 5
+
+
+def issued(first: date, days: int) -> Key:
+    master = generate_master("fake-key", SCHEME, date(2027, 1, 1), 60).holding
+    return Key("fake-key", master.for_robot(["a"], first, first + timedelta(days - 1)), SCHEME)
+
+
+def test_after_the_key_s_last_day_the_robot_drives_on_in_silence(tmp_path):
+    # The run begins twenty seconds before midnight.
+    midnight_s = (NOON_UNIX_S // 86_400 + 1) * 86_400
+    day = Day(tmp_path, midnight_s - 20.0 - NOON_UNIX_S, issued(date(2027, 1, 15), 1))
+    noise, _, _ = day.run(60.0)
+    assert len(noise) > 50 * 15
+    assert max(unix_s for unix_s, _ in noise) < midnight_s + 2.4
+
+
+def test_a_step_to_a_day_without_a_key_is_told_and_silent(tmp_path):
+    day = Day(tmp_path, key=issued(date(2027, 1, 15), 2))
+    noise, events, _ = day.run(60.0, 0.0, (20.0, 30 * 86_400.0), (40.0, -30 * 86_400.0))
+    # The step is seen within a second.
+    assert not any(unix_s > NOON_UNIX_S + 30 * 86_400.0 + 21.1 for unix_s, _ in noise)
+    said = [text for text in told(events) if "no noise (this key file is for days up to 2027-01-16" in text]
+    assert len(said) == 1
+    # The right time again: what follows was not played before.
+    assert repeated((noise,)) == 0
+    assert any(unix_s > NOON_UNIX_S + 45.0 for unix_s, _ in noise)
 
 
 def test_a_disk_that_is_full_ends_the_noise(day, monkeypatch):
