@@ -20,8 +20,8 @@ Integers = NDArray[np.int64]
 TableOf = Callable[[Terms], Floats]
 Said = Callable[[TableOf], Floats]
 
-_PAIRS = 12
-_HYPOTHESES = 64
+_PAIRS = 8
+_HYPOTHESES = 48
 
 
 @dataclass(frozen=True)
