@@ -145,7 +145,10 @@ class Robot:
         begun_s = time.clock_gettime(time.CLOCK_BOOTTIME)
         command = [sys.executable, "-m", "mtm_onboard", "run", "--config", self.config, "--key", self.key]
         with subprocess.Popen(
-            [*command, "--message", "3"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+            [*command, "--message", "3", "--allow-unsynchronised"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
         ) as process:
             self._wait_until_sent(ticks, process)
             memory_bytes = most_memory_bytes(process.pid)

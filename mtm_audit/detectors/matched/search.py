@@ -116,23 +116,62 @@ def search_timings(
             progress(fraction)
 
     if isinstance(onset, int | float):
-        return _delays_and_rates(place, len(rates_hz), tones, motion, lead, report)
+        return _delays_and_rates(place, len(rates_hz), spacing, tones, motion, lead, report)
     return _onsets_and_rates(place, len(rates_hz), spacing, tones, motion, lead, report)
 
 
 def _delays_and_rates(
-    place: _Place, rates: int, tones: Sequence[Sequence[Tones]], motion: Motion, lead: int, report: _Report
+    place: _Place,
+    rates: int,
+    spacing: float,
+    tones: Sequence[Sequence[Tones]],
+    motion: Motion,
+    lead: int,
+    report: _Report,
 ) -> list[Found]:
     """Only the rate is open, and how late the robot follows: all can be weighed with one set of gains."""
+    usual, others = _by_use(rates, spacing)
+    best = _best_delays(place, usual, tones, motion, lead, report)
+    if others and not _plain([(found.evidence, coarse) for found, coarse in best], rates, spacing):
+        pairs = zip(best, _best_delays(place, others, tones, motion, lead, report), strict=True)
+        best = [max(pair, key=_found_evidence) for pair in pairs]
+    return [_closer(place, coarse, each, tones[number], motion, lead) for number, (each, coarse) in enumerate(best)]
+
+
+def _best_delays(
+    place: _Place,
+    rates: Sequence[int],
+    tones: Sequence[Sequence[Tones]],
+    motion: Motion,
+    lead: int,
+    report: _Report,
+) -> list[tuple[Found, int]]:
+    """The best timing of each channel at some coarse rates, and at which of them."""
     best: list[tuple[Found, int]] = []
-    shifts = _LATER_S / motion.step_s
-    for coarse in range(rates):
-        report(coarse / rates)
+    for done, coarse in enumerate(rates):
+        report(done / len(rates))
         heard, grid = place(coarse)
-        found = _surroundings(heard, grid, tones, [0] * len(tones), motion, lead, shifts)
+        found = _surroundings(heard, grid, tones, [0] * len(tones), motion, lead, _LATER_S / motion.step_s)
         here = [(each, coarse) for each in found]
         best = here if not best else [max(pair, key=_found_evidence) for pair in zip(best, here, strict=True)]
-    return [_closer(place, coarse, each, tones[number], motion, lead) for number, (each, coarse) in enumerate(best)]
+    return best
+
+
+def _by_use(rates: int, spacing: float) -> tuple[list[int], list[int]]:
+    """The coarse rates that usual clocks have, and the others."""
+    middle = rates // 2
+    usual = [coarse for coarse in range(rates) if abs(coarse - middle) * spacing <= _USUAL_RATES]
+    return usual, [coarse for coarse in range(rates) if coarse not in usual]
+
+
+def _plain(best: Sequence[tuple[float, int]], rates: int, spacing: float) -> bool:
+    """Whether every message stands out well inside the usual rates: clocks are seldom far off, and then others cannot
+    do better.
+    """
+    middle = rates // 2
+    return all(
+        evidence > _PLAIN_NATS and abs(coarse - middle) * spacing <= 0.5 * _USUAL_RATES for evidence, coarse in best
+    )
 
 
 def _found_evidence(found: tuple[Found, int]) -> float:
@@ -155,16 +194,9 @@ def _onsets_and_rates(
     lead: int,
     report: _Report,
 ) -> list[Found]:
-    middle = rates // 2
-    usual = [coarse for coarse in range(rates) if abs(coarse - middle) * spacing <= _USUAL_RATES]
+    usual, others = _by_use(rates, spacing)
     best = _best_of_rates(place, usual, tones, motion, report)
-    # Clocks are seldom far off: where every message stands out well inside the usual rates, others cannot do better.
-    plain = all(
-        evidence > _PLAIN_NATS and abs(winner.coarse - middle) * spacing <= 0.5 * _USUAL_RATES
-        for evidence, winner in best
-    )
-    if not plain and len(usual) < rates:
-        others = [coarse for coarse in range(rates) if coarse not in usual]
+    if others and not _plain([(evidence, winner.coarse) for evidence, winner in best], rates, spacing):
         pairs = zip(best, _best_of_rates(place, others, tones, motion, report), strict=True)
         best = [max(pair, key=_evidence) for pair in pairs]
     found_at: dict[int, Found] = {}

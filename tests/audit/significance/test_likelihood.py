@@ -57,7 +57,7 @@ def both_groups(tones):
 @cache
 def values(power):
     """Log e-values (hypotheses, groups, waveforms), and the exact variance (hypotheses, groups) of each e-value."""
-    chosen = hypotheses(60, seed=8)
+    chosen = hypotheses(80, seed=8)
     found = log_e(projections(), both_groups(waveforms(power)), all_levels(), TURNS, chosen, power)
     linear, quadratic = weights(projections(), all_levels(), TURNS, chosen)
     log_mean = log_mean_normal if power == "ensemble" else log_mean_sphere
@@ -96,7 +96,7 @@ def test_large_values_are_as_rare_as_markov_says(power, share):
 
 
 def test_each_power_law_has_its_own_normaliser():
-    chosen = hypotheses(60, seed=8)
+    chosen = hypotheses(80, seed=8)
     linear, quadratic = weights(projections(), all_levels(), TURNS, chosen)
     apart = (log_mean_normal(linear, quadratic) - log_mean_sphere(linear, quadratic)).sum(axis=-1)
     tones = both_groups(waveforms("window")[:5])
