@@ -11,7 +11,7 @@ PYTEST :=
 # The build without CUDA where the index offers it under this number.
 TORCH := torch==2.13.0
 
-.PHONY: setup demo site test test-all test-long test-oldest explore coverage lint peers bench mutants firmware \
+.PHONY: setup demo site test test-audit test-others test-all test-long test-oldest explore coverage lint peers bench mutants firmware \
   firmware-mutants deb deb-test dist constraints clean
 
 # $(call install,folder,file): the packages that a file of constraints/ names, by hash, and the project itself.
@@ -34,8 +34,15 @@ demo: $(VENV)/.hil
 	rm -rf out/demo
 	$(BIN)/mtm-hil demo --out out/demo
 
+# The auditor's tests take about as long as all others, so that both halves run beside each other.
 test: setup lint
-	$(BIN)/pytest -m "not long and not peer" $(PYTEST)
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target test-audit test-others
+
+test-audit: setup
+	$(BIN)/pytest -m "not long and not peer" $(PYTEST) tests/audit
+
+test-others: setup
+	$(BIN)/pytest -m "not long and not peer" $(PYTEST) --ignore=tests/audit tests
 
 # Everything: what `make test` runs, and then the rest.
 test-all: test test-long test-oldest mutants firmware firmware-mutants peers site

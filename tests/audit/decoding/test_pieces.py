@@ -38,7 +38,7 @@ def long_recording(seconds, first_s, last_s, secret=None):
     return Track("robot0", times_s, np.cumsum(steps, axis=0), np.ones(len(times_s), dtype=bool))
 
 
-@pytest.mark.parametrize("onset_s", [None, 400.0], ids=["searched", "known"])
+@pytest.mark.parametrize("onset_s", [pytest.param(None, marks=pytest.mark.long), 400.0], ids=["searched", "known"])
 def test_a_message_in_one_minute_of_eleven_is_found(onset_s):
     found = decode_tracks([long_recording(660.0, 400.0, 460.0)], KEY, DecodeSettings(onset_s=onset_s))
     assert found.verdict != "absent"
@@ -48,6 +48,7 @@ def test_a_message_in_one_minute_of_eleven_is_found(onset_s):
     assert piece_sentence(found).endswith(f"{begin_s:.0f} s to {end_s:.0f} s show.")
 
 
+@pytest.mark.long
 def test_another_key_finds_nothing_in_eleven_minutes():
     found = decode_tracks([long_recording(660.0, 400.0, 460.0, OTHER_SECRET)], KEY, DecodeSettings())
     assert found.verdict == "absent"

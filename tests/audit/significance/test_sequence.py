@@ -18,7 +18,7 @@ ROLLING = replace(FIXED, schedule="rolling")
 
 
 @cache
-def nats(scheme, keys=40):
+def nats(scheme, keys=30):
     """The likeliest message's log e-value under keys that had no part in the recording."""
     found = []
     for number in range(keys):
@@ -65,7 +65,7 @@ def test_a_second_part_is_weighed_by_what_the_first_has_shown():
     terms = terms_of(ROLLING, Codebook(secret(2), ROLLING), prepared(), 6, scores=scores)
     first = sequence(weighed(terms, 0.0))
     values = []
-    for number in range(40):
+    for number in range(30):
         other = terms_of(ROLLING, Codebook(secret(100 + number), ROLLING), prepared(), 6, scores=scores)
         values.append(continued(first, other, other.at(terms.timing)))
     assert np.sum(np.array(values) >= np.log(10.0)) <= stats.binom.isf(0.001, len(values), 0.1)
