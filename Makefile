@@ -36,7 +36,7 @@ demo: $(VENV)/.hil
 
 # The auditor's tests take about as long as all others, so that both halves run beside each other.
 test: setup lint
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync=line test-audit test-others
+	@$(MAKE) --no-print-directory --jobs=2 test-audit test-others
 
 test-audit: setup
 	$(BIN)/pytest -m "not long and not peer" $(PYTEST) tests/audit
