@@ -14,7 +14,7 @@ from mtm_audit.decoding.order import order_is_known
 from mtm_audit.decoding.paid import paid_for, worth
 from mtm_audit.decoding.pieces import Piece, pieces_of
 from mtm_audit.decoding.pooling import pooled_posteriors, pooled_symbols
-from mtm_audit.decoding.readings import Progress, Readings, read_tracks
+from mtm_audit.decoding.readings import Progress, Readings, part_of, read_tracks
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.decoding.start import start_of
 from mtm_audit.decoding.verdict import is_present, judged
@@ -56,7 +56,7 @@ def _best_piece(pieces: Sequence[Piece], key: Key, settings: DecodeSettings, pro
     found: list[Decoding] = []
     refusal: MtmError | None = None
     for number, piece in enumerate(pieces):
-        shown = None if progress is None else _part(progress, number, len(pieces))
+        shown = part_of(progress, "piece", number, len(pieces))
         try:
             own = _judged_by_enough(piece.tracks, key, settings, shown) if piece.tracks else None
         except MtmError as error:
@@ -81,10 +81,6 @@ def _once(frames: Sequence[Delivered]) -> tuple[Delivered, ...]:
             kept[-1] = replace(kept[-1], end_s=max(kept[-1].end_s, frame.end_s),
                                slots=(kept[-1].slots[0], max(kept[-1].slots[1], frame.slots[1])))  # fmt: skip
     return tuple(kept)
-
-
-def _part(progress: Progress, number: int, count: int) -> Progress:
-    return lambda stage, fraction: progress(f"piece {number + 1} of {count}: {stage}", (number + fraction) / count)
 
 
 def _judged_by_enough(

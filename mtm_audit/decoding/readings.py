@@ -32,6 +32,13 @@ _MOST_TICKS = 500_000
 Progress = Callable[[str, float], None]
 
 
+def part_of(progress: Progress | None, what: str, number: int, count: int) -> Progress | None:
+    """The progress of one of so many tries, such as pieces or speeds, told as part of the whole."""
+    if progress is None:
+        return None
+    return lambda stage, fraction: progress(f"{what} {number + 1} of {count}: {stage}", (number + fraction) / count)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Readings:
     """`channels` by name, those that could be read, and `refusals` why others could not; `message` the exact evidence,

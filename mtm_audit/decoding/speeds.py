@@ -7,7 +7,7 @@ from dataclasses import replace
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.decoding.paid import paid_for, worth
-from mtm_audit.decoding.readings import Progress
+from mtm_audit.decoding.readings import Progress, part_of
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.track import Track
 from mtm_onboard.protocol.errors import MtmError
@@ -61,7 +61,7 @@ def decode_at_speeds(
     best: tuple[float, Decoding] | None = None
     refusal: MtmError | None = None
     for number, speed in enumerate(speeds):
-        shown = None if progress is None else _part(progress, number, len(speeds))
+        shown = part_of(progress, "speed", number, len(speeds))
         try:
             found = decode_tracks(played(tracks, speed), key, at_speed(settings, tracks, speed), shown)
         except MtmError as error:
@@ -86,7 +86,3 @@ def _settles(decoding: Decoding) -> bool:
 
 def _begin_s(tracks: Sequence[Track]) -> float:
     return min((float(track.times_s[0]) for track in tracks if len(track.times_s)), default=0.0)
-
-
-def _part(progress: Progress, number: int, count: int) -> Progress:
-    return lambda stage, fraction: progress(f"speed {number + 1} of {count}: {stage}", (number + fraction) / count)

@@ -17,6 +17,7 @@ from mtm_audit.model.reference_frame import (
     ReferenceFrame,
     along_own_axes,
     known_frames,
+    shows_heading,
     turning,
 )
 from mtm_audit.model.timing import Onset
@@ -38,7 +39,7 @@ def frames_of(channels: Sequence[Channel], glimpses: Iterable[Glimpse]) -> tuple
     """
     seen = list(glimpses)
     # What a robot's turning is seen by, its forward speed is seen along as well.
-    if any(_turning(channel) for channel in channels) and any(turning(glimpse, "body") for glimpse in seen):
+    if any(_turning(channel) for channel in channels) and any(shows_heading(glimpse) for glimpse in seen):
         return ("body",)
     known = {frame for glimpse in seen for frame in known_frames(glimpse)}
     if any(len(_planar(channel)) > 1 for channel in channels):

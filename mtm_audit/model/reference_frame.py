@@ -35,6 +35,11 @@ def known_frames(glimpse: Glimpse) -> tuple[ReferenceFrame, ...]:
     return ("world",) if _holds_heading(glimpse.headings_rad) else ("world", "body")
 
 
+def shows_heading(glimpse: Glimpse) -> bool:
+    """Whether the body moves in the plane and its heading was recorded."""
+    return glimpse.axes == _PLANE and glimpse.headings_rad is not None
+
+
 def _holds_heading(headings_rad: Floats) -> bool:
     return bool(np.abs(np.mean(np.exp(1j * headings_rad))) > _STEADY)
 

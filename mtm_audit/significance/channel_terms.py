@@ -8,6 +8,7 @@ from scipy.special import logsumexp
 
 from mtm_audit.detectors.base import ChannelReading
 from mtm_audit.detectors.matched.correlate import Prepared, stacked_tones
+from mtm_audit.detectors.matched.evidence import log_sum_exp
 from mtm_audit.detectors.matched.plants import Plants, joined, plant_family, returning, second_order
 from mtm_audit.detectors.matched.projections import Places, Projections, project
 from mtm_audit.model.timing import Onset, Timing
@@ -32,7 +33,6 @@ _COARSE_LEVELS = 3
 _CANDIDATES = 8
 # Prior probability that a position carries nothing: hidden, beyond the message's end, or not played.
 _SILENT = 0.1
-_LEAST, _LEAST_LOG = 1e-300, -1e300
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,13 +93,7 @@ class ChannelTerms:
         summed = self.by_position(table)
         if without is not None:
             summed = np.where(self.candidates == without, -np.inf, summed)
-        return or_silent(_log_sum(summed) - np.log(self.alphabet_size))
-
-
-def _log_sum(values: Floats) -> Floats:
-    """As scipy's logsumexp over the last axis, in a third of the time; tables have millions of entries."""
-    top = np.maximum(values.max(axis=-1), _LEAST_LOG)
-    return np.asarray(top + np.log(np.exp(values - top[..., None]).sum(axis=-1) + _LEAST))
+        return or_silent(log_sum_exp(summed, axis=-1) - np.log(self.alphabet_size))
 
 
 def or_silent(log_values: Floats, count: int = 1) -> Floats:

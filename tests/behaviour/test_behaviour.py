@@ -16,7 +16,7 @@ COPY = Command("copy", "mtm-audit copy a.csv", writes=("b.csv",), copies=(("firs
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
-        ("wrote {folder}/work/a.csv\n", "wrote FOLDER/work/a.csv\n"),
+        ("wrote {folder}/made/a.csv\n", "wrote FOLDER/made/a.csv\n"),
         ("{root}/hil/cli.py:3: a warning", "CHECKOUT/hil/cli.py:3: a warning"),
         ("its cells took 12 minutes of one core", "its cells took ELAPSED of one core"),
         ("it took 0.25 s", "it took ELAPSED"),

@@ -43,3 +43,11 @@ def test_log_sum_exp_is_what_its_name_says(values):
 def test_log_sum_exp_neither_overflows_nor_vanishes():
     assert log_sum_exp(np.array([1e6, 1e6]), axis=0) == pytest.approx(1e6 + np.log(2.0))
     assert log_sum_exp(np.array([-1e6, -1e6, -1e9]), axis=0) == pytest.approx(-1e6 + np.log(2.0))
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_where_nothing_is_likely_the_sum_is_not_either(kind):
+    values = np.array([[-np.inf, -np.inf], [-np.inf, 2.0], [1e4, 1e4]], dtype=kind)
+    found = log_sum_exp(values, axis=1)
+    assert found.dtype == kind
+    assert found == pytest.approx([-np.inf, 2.0, 1e4 + np.log(2.0)])
