@@ -28,6 +28,7 @@ from mtm_audit.reporting.stages import Stage, stages_of_decoding, stages_of_reco
 from mtm_audit.reporting.text import print_report
 from mtm_audit.tracking.registry import tracker
 from mtm_onboard.protocol.key import Key
+from mtm_onboard.protocol.output_file import check_outputs
 
 _PIPE_COLUMNS = 140
 EXIT_CODES = {"decoded": 0, "absent": 3, "inconclusive": 4}
@@ -52,6 +53,7 @@ class DecodeOptions:
     reading: ReadOptions = field(default_factory=ReadOptions)
     frame_rate_hz: float | None = None
     speed: float | None = 1.0
+    force: bool = False
 
 
 def run_decode(options: DecodeOptions) -> int:
@@ -82,6 +84,7 @@ def _check(options: DecodeOptions) -> None:
     make_detector(options.settings.detector, options.settings.profile)
     tracker(options.tracker)
     check_speed(1.0 if options.speed is None else options.speed)
+    check_outputs("mtm-audit decode", options.plot, force=options.force)
     if options.plot is not None:
         from mtm_audit.reporting.plot import check_plot_path
 

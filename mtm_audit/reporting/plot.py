@@ -15,8 +15,8 @@ from matplotlib.ticker import MaxNLocator
 from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.model.recording import Recording
 from mtm_audit.model.track import Floats, Track
+from mtm_audit.reporting.figure_file import save_figure
 from mtm_audit.reporting.text import chance_sentence, verdict_sentence
-from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
 
 SUFFIXES = (".png", ".pdf", ".svg")
@@ -62,8 +62,7 @@ def draw_plot(recording: Recording, decoding: Decoding, path: Path) -> None:
         _draw_scores(scores, decoding)
         _draw_evidence(evidence, decoding)
         _draw_margins(margins, decoding)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
+    save_figure(figure, path, "mtm-audit decode")
 
 
 def _draw_tracks(axes: Axes, tracks: tuple[Track, ...]) -> None:
