@@ -22,19 +22,25 @@ class Renderer(StrEnum):
 
 
 # A recording: `record` and `film`.
-NewFolder = Annotated[Path, typer.Option(help="The folder to make; it must not exist.")]
+NewFolder = Annotated[Path, typer.Option(metavar="FOLDER", help="The folder to make; it must not exist.")]
 MessageNumber = Annotated[int | None, typer.Option(metavar="N", help="The message as a number.")]
 NoMessage = Annotated[bool, typer.Option("--no-message", help="Move without a message.")]
-KeyFile = Annotated[Path | None, typer.Option(help="The key file; one is made in the folder without it.")]
-WorldSeed = Annotated[int, typer.Option(min=0, help="Decides everything random but the message's waveforms.")]
+KeyFile = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="The key file; one is made in the folder without it.")
+]
+WorldSeed = Annotated[
+    int, typer.Option(metavar="N", min=0, help="Decides everything random but the message's waveforms.")
+]
 
 # An experiment.
 RendererName = Annotated[Renderer, typer.Option(help="Who draws the pictures: the software camera or the simulator.")]
-FirstSeed = Annotated[int, typer.Option(min=0, help="The first rollout's seed.")]
-CellSeed = Annotated[int, typer.Option(min=0, help="The first cell's seed.")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Processes; as many as cores by default.")]
-OutCsv = Annotated[Path | None, typer.Option(help="A CSV file to write as well.")]
-Cells = Annotated[Path, typer.Option(help="File of finished rollouts, with which an interrupted run goes on.")]
+FirstSeed = Annotated[int, typer.Option(metavar="N", min=0, help="The first rollout's seed.")]
+CellSeed = Annotated[int, typer.Option(metavar="N", min=0, help="The first cell's seed.")]
+Workers = Annotated[int | None, typer.Option(metavar="N", min=1, help="Processes; as many as cores by default.")]
+OutCsv = Annotated[Path | None, typer.Option(metavar="FILE.csv", help="A CSV file to write as well.")]
+Cells = Annotated[
+    Path, typer.Option(metavar="FILE.jsonl", help="File of finished rollouts, with which an interrupted run goes on.")
+]
 # Where each keeps its finished cells unless told otherwise.
 CELLS_FOLDER = Path("out/cells")
 
