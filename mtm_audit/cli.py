@@ -1,7 +1,4 @@
-"""The command line: `mtm-audit <command>`.
-
-Exit codes of `decode`: 0 decoded, 3 absent, 4 inconclusive, 1 error, 2 usage, 130 interrupted.
-"""
+"""The command line: `mtm-audit <command>`. Exit codes: docs/command-line.md."""
 
 import math
 import os
@@ -13,18 +10,21 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mtm_audit.commands.errors import reported
+from mtm_audit.commands.force import Force
+from mtm_audit.commands.manner import HELP_OPTIONS, version_option
 
 if TYPE_CHECKING:
     from mtm_audit.readers.logs.options import ReadOptions
 
 app = typer.Typer(
     help="Find out what a robot said with its motion: from a recording and a key to a verdict.",
-    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+    no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, context_settings=HELP_OPTIONS,
 )  # fmt: skip
 
 _TRACKER_HELP = (
-    "How to find robots in a video: aruco or aruco:6x6_250, colour:NAME,..., brightness:X0,Y0,X1,Y1, "
-    "arms:INNER,OUTER, football or flow:X0,Y0,X1,Y1 (pixels from the upper left corner)."
+    "How to find robots in a video: aruco or aruco:6x6_250, colour:NAME,..., centroid:COLOUR, brightness or "
+    "brightness:X0,Y0,X1,Y1, arms:INNER,OUTER, football, or flow:X0,Y0,X1,Y1 (pixels from the upper left corner); "
+    "see docs/filming.md."
 )
 
 
@@ -53,19 +53,9 @@ class StrategyName(StrEnum):
     SPLIT = "split"
 
 
-def _version(asked: bool) -> None:
-    if asked:
-        from importlib.metadata import version
-
-        print(f"mtm-audit {version('messages-through-motion')}")
-        raise typer.Exit
-
-
 @app.callback()
 def _every_command(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
+    version: Annotated[bool, version_option("mtm-audit")] = False,
 ) -> None:
     pass
 
@@ -115,16 +105,21 @@ def decode(
     decoys: Annotated[
         int | None,
         typer.Option(
-            min=8, max=10_000, help="Keys that nobody holds, to compare with: 40 for coherency, none for matched."
+            metavar="N",
+            min=8,
+            max=10_000,
+            help="Keys that nobody holds, to compare with: 40 for coherency, none for matched.",
         ),
     ] = None,
     threshold: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="How often a message that is called decoded may be wrong.")
+        float,
+        typer.Option(metavar="P", min=1e-12, max=1.0, help="How often a message that is called decoded may be wrong."),
     ] = 1e-4,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON (docs/decode-json.md) instead of a table.")
     ] = False,
     plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw the decode (.png, .pdf, .svg).")] = None,
+    force: Force = False,
     explain: Annotated[bool, typer.Option("--explain", help="Say stage by stage what was found.")] = False,
     profile: Annotated[
         Path | None, typer.Option(metavar="FILE", help="What mtm-audit profile learnt about this type of robot.")
@@ -181,7 +176,7 @@ def decode(
             DecodeOptions(
                 paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker,
                 reference=_names(reference), settings=settings, as_json=as_json, plot=plot, explain=explain,
-                reading=reading, frame_rate_hz=frame_rate, speed=played,
+                reading=reading, frame_rate_hz=frame_rate, speed=played, force=force,
             )
         )  # fmt: skip
     raise typer.Exit(code)
@@ -194,6 +189,7 @@ def learn_profile(
     ],
     key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
     out: Annotated[Path, typer.Option(metavar="FILE.profile", help="Where to write what was learnt.")],
+    force: Force = False,
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
@@ -225,7 +221,7 @@ def learn_profile(
 
         settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
         reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
-        run_profile(ProfileOptions(tuple(paths), key, out, tracker, _names(reference), settings, reading))
+        run_profile(ProfileOptions(tuple(paths), key, out, tracker, _names(reference), settings, reading, force))
 
 
 @app.command("journal")
@@ -238,12 +234,13 @@ def show_journal(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="Draw commands and lateness (.png, .pdf, .svg).")
     ] = None,
+    force: Force = False,
 ) -> None:
     """Say what a robot's journal tells: message and start, ticks, lateness, limits, noise and events."""
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.journal import run_journal
 
-        run_journal(path, as_json=as_json, plot=plot, key=key)
+        run_journal(path, as_json=as_json, plot=plot, key=key, force=force)
 
 
 @app.command()
@@ -271,6 +268,7 @@ def plan(
         Path | None, typer.Option(metavar="FILE.toml", help="Scheme file for mtm-onboard keygen --scheme.")
     ] = None,
     plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw accuracy over T.")] = None,
+    force: Force = False,
 ) -> None:
     """Find the fastest scheme for a payload and a target accuracy, from measured accuracies (docs/planning.md).
 
@@ -286,7 +284,7 @@ def plan(
 
         problem = Problem(bits, accuracy, tuple(alphabet) if alphabet else None, measured_only)
         chosen = None if strategy is None else strategy.value
-        code = run_plan(PlanOptions(table, problem, rate, like, chosen, check, plot, out))
+        code = run_plan(PlanOptions(table, problem, rate, like, chosen, check, plot, out, force))
     raise typer.Exit(code)
 
 
@@ -365,11 +363,13 @@ def _reading(
     arrival_times: bool,
 ) -> "ReadOptions":
     from mtm_audit.readers.logs.options import ReadOptions, marker_groups
+    from mtm_onboard.protocol.errors import command_line_values
 
-    return ReadOptions(
-        unit=unit, time_unit=time_unit, up=up, topics=tuple(topics or ()), bodies=marker_groups(bodies or ()),
-        arrival_times=arrival_times,
-    )  # fmt: skip
+    with command_line_values():
+        return ReadOptions(
+            unit=unit, time_unit=time_unit, up=up, topics=tuple(topics or ()), bodies=marker_groups(bodies or ()),
+            arrival_times=arrival_times,
+        )  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

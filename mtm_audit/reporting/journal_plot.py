@@ -7,9 +7,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from mtm_audit.reporting.figure_file import save_figure
 from mtm_audit.reporting.journal_summary import AXES
 from mtm_audit.reporting.plot import check_plot_path
-from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.journal_file import JournalRecord
 
 _UNITS = ("m/s", "m/s", "rad/s")
@@ -44,5 +44,4 @@ def draw_journal(record: JournalRecord, path: Path) -> None:
     lateness.set(xscale="log", yscale="log", xlabel="lateness of a tick [ms]", ylabel="ticks")
     lateness.set_ylim(bottom=0.5)
     lateness.spines[["top", "right"]].set_visible(False)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
+    save_figure(figure, path, "mtm-audit journal")

@@ -15,9 +15,9 @@ from matplotlib.ticker import MaxNLocator
 from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.model.recording import Recording
 from mtm_audit.model.track import Floats, Track
+from mtm_audit.reporting.figure_file import save_figure
 from mtm_audit.reporting.text import chance_sentence, verdict_sentence
-from mtm_onboard.protocol.atomicfile import replacing
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import MtmError, WrongValueError
 
 SUFFIXES = (".png", ".pdf", ".svg")
 
@@ -32,7 +32,7 @@ _PLACES_NAMED = 24
 def check_plot_path(path: Path) -> None:
     """Raise MtmError unless a picture can be written to `path`; meant for the time before the long work."""
     if path.suffix.lower() not in SUFFIXES:
-        raise MtmError(f"{path} is no picture format that can be drawn; end the name in {', '.join(SUFFIXES)}")
+        raise WrongValueError(f"{path} is no picture format that can be drawn; end the name in {', '.join(SUFFIXES)}")
     if path.is_dir():
         raise MtmError(f"{path} is a folder; name a file for the picture")
     try:
@@ -62,8 +62,7 @@ def draw_plot(recording: Recording, decoding: Decoding, path: Path) -> None:
         _draw_scores(scores, decoding)
         _draw_evidence(evidence, decoding)
         _draw_margins(margins, decoding)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
+    save_figure(figure, path, "mtm-audit decode")
 
 
 def _draw_tracks(axes: Axes, tracks: tuple[Track, ...]) -> None:
