@@ -32,7 +32,7 @@ def on_cluster(function: Callable[[T], R], arguments: Sequence[T], scheduler: st
         names = [f"mtm-{uuid4().hex}" for _ in arguments]
         futures = client.map(function, list(arguments), key=names, pure=False)
         places = {future.key: place for place, future in enumerate(futures)}
-        pending = as_completed(futures)
+        pending = as_completed(futures, loop=client.loop)
         del futures
         try:
             for future in pending:

@@ -7,7 +7,9 @@ from pathlib import Path
 from mtm_audit.ingest.chapters import chapters_of, check_whole
 from mtm_audit.ingest.films import is_picture
 from mtm_audit.ingest.load import VIDEO_SUFFIXES, is_video
-from mtm_audit.ingest.source import Source, sources_of
+from mtm_audit.ingest.logs import log_files
+from mtm_audit.ingest.source import Source
+from mtm_audit.readers.picture_folder import pictures_in
 from mtm_onboard.protocol.errors import MtmError
 
 
@@ -25,8 +27,9 @@ class Found:
 def find_recordings(paths: Sequence[Path], out: Path) -> tuple[Found, ...]:
     """The recordings in the order of `paths`, those of a folder by name, each once; the table `out` is none of them.
 
-    Each file is a recording of its own, but for the chapters of a film and several pictures of one folder. A folder
-    holds what `sources_of` says, and what its folders hold. Nothing that is wrong with one raises an error.
+    Each file is a recording of its own, but for the chapters of a film and several pictures of one folder. In a folder
+    each film is one, its logs together are another, and so are its pictures where it holds no film; then come its
+    folders. Nothing that is wrong with one raises an error.
     """
     found: list[Found] = []
     files: list[Path] = []
@@ -90,30 +93,25 @@ def _in_folder(folder: Path, out: Path) -> list[Found]:
         return [Found(str(folder), None, f"{folder} cannot be read ({error.strerror}); check its permissions")]
     # Not only when all are whole: one film with a missing chapter does not hide the others.
     videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
-    found = [_film(chapters) for chapters in chapters_of(videos)] if videos else _others_in(folder, out)
-    sources = [item.source for item in found if item.source is not None]
-    if any(folder in source.files for source in sources):
+    found = [_film(chapters) for chapters in chapters_of(videos)]
+    pictures = not videos and bool(pictures_in(folder))
+    found += [Found(str(folder), Source((folder,), "video"))] if pictures else _logs_in(folder, out)
+    # What lies in a bag's folder are its parts.
+    if any(item.source is not None and not pictures and folder in item.source.files for item in found):
         return found
-    for entry in entries:
-        # Links could lead back to a folder above.
-        if entry.is_dir() and not entry.is_symlink():
-            known = {file for source in sources for file in source.files}
-            deeper = _in_folder(entry, out)
-            found += [item for item in deeper if item.source is None or not known.intersection(item.source.files)]
-    return found
+    # Links could lead back to a folder above.
+    deeper = [_in_folder(entry, out) for entry in entries if entry.is_dir() and not entry.is_symlink()]
+    return [*found, *(item for items in deeper for item in items)]
 
 
-def _others_in(folder: Path, out: Path) -> list[Found]:
-    """A folder of pictures, or the logs of a folder, which are one recording."""
-    try:
-        (source,) = sources_of([folder])
-    except MtmError:
-        return []
-    files = tuple(file for file in source.files if file.absolute() != out.absolute())
+def _logs_in(folder: Path, out: Path) -> list[Found]:
+    """The logs of a folder, which are one recording."""
+    left_out: list[str] = []
+    files = tuple(file for file in log_files(folder, left_out.append) if file.absolute() != out.absolute())
     if not files:
         return []
-    place = files[0] if len(files) == 1 else files[0].parent
-    return [Found(str(place), replace(source, files=files))]
+    place = files[0] if len(files) == 1 else folder
+    return [Found(str(place), Source(files, "motion capture", tuple(left_out)))]
 
 
 def _nothing_in(folder: Path) -> Found:
