@@ -5,13 +5,14 @@ import os
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mtm_audit.commands.errors import reported
 from mtm_audit.commands.force import Force
 from mtm_audit.commands.manner import HELP_OPTIONS, version_option
+from mtm_audit.commands.shared_options import takes_options_of
 
 if TYPE_CHECKING:
     from mtm_audit.readers.logs.options import ReadOptions
@@ -179,6 +180,93 @@ def decode(
                 reading=reading, frame_rate_hz=frame_rate, speed=played, force=force,
             )
         )  # fmt: skip
+    raise typer.Exit(code)
+
+
+@app.command()
+@takes_options_of(
+    decode,
+    "onset",
+    "tracker",
+    "reference",
+    "assign",
+    "frame_rate",
+    "speed",
+    "search_speed",
+    "detector",
+    "decoys",
+    "threshold",
+    "profile",
+    "at",
+    "at_error",
+    "topic",
+    "body",
+    "unit",
+    "time_unit",
+    "up",
+    "arrival_times",
+    "revoked",
+)
+def batch(
+    paths: Annotated[
+        list[Path], typer.Argument(metavar="PATH", help="Recordings, and folders that hold any (docs/batch.md).")
+    ],
+    *,
+    key: Annotated[list[Path], typer.Option(metavar="FILE", help="A key file; may be repeated, which is paid for.")],
+    out: Annotated[Path, typer.Option(metavar="FILE.csv", help="The table to write, a row for each recording.")],
+    jobs: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Recordings read at once (default: one a core).")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="A Dask cluster to work on, such as tcp://192.168.0.2:8786."),
+    ] = None,
+    cache: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Where tracks are kept for the next key (default: ~/.cache/mtm/tracks)."),
+    ] = None,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Replace any table or other file, whatever it holds; a key file never is."),
+    ] = False,
+    **shared: Any,
+) -> None:
+    """Decode many recordings into one table; a run that was stopped goes on when it is started again.
+
+    Exit codes: 0 all were read, whatever they say, 1 error, or some could not be read, 2 usage, 130 interrupted.
+    """  # fmt: skip
+    if scheduler is not None and jobs is not None:
+        raise typer.BadParameter("the cluster's workers decide that; leave it or --scheduler out", param_hint="--jobs")
+    if shared["search_speed"] and shared["speed"] is not None:
+        raise typer.BadParameter("is given; leave it or --search-speed out", param_hint="--speed")
+    onset_s, pairs, at_unix_s = _onset_s(shared["onset"]), _pairs(shared["assign"] or []), _unix_s(shared["at"])
+    with reported("mtm-audit", f"what is finished is in {out}, and the same command goes on from there"):
+        from mtm_audit.batch.plan import Plan, named_keys
+        from mtm_audit.commands.batch import BatchOptions, run_batch_command
+        from mtm_audit.decoding.settings import DecodeSettings
+        from mtm_audit.detectors.matched.profile import load_profile
+        from mtm_audit.model.recorded_at import RecordedAt
+        from mtm_onboard.protocol.revocation import RevocationList, load_revocations
+
+        revoked = RevocationList() if shared["revoked"] is None else load_revocations(shared["revoked"])
+        settings = DecodeSettings(
+            detector=shared["detector"], onset_s=onset_s, decoys=shared["decoys"], threshold=shared["threshold"],
+            assignment=pairs, profile=None if shared["profile"] is None else load_profile(shared["profile"]),
+            at=None if at_unix_s is None else RecordedAt(at_unix_s, shared["at_error"]), revoked=revoked,
+        )  # fmt: skip
+        reading = _reading(
+            shared["topic"], shared["body"], shared["unit"], shared["time_unit"], shared["up"],
+            arrival_times=shared["arrival_times"],
+        )  # fmt: skip
+        speed = None if shared["search_speed"] else 1.0 if shared["speed"] is None else shared["speed"]
+        plan = Plan(
+            keys=named_keys(key, revoked), settings=settings, tracker=shared["tracker"],
+            reference=_names(shared["reference"]), reading=reading, frame_rate_hz=shared["frame_rate"], speed=speed,
+            cache=None if cache is None else cache.absolute(),
+        )  # fmt: skip
+        code = run_batch_command(
+            BatchOptions(paths=tuple(paths), plan=plan, out=out, jobs=jobs, scheduler=scheduler, force=force)
+        )
     raise typer.Exit(code)
 
 

@@ -24,7 +24,7 @@ LEVELS = {
     ),
     "mtm_audit": (
         "model", "readers", "tracking", "ingest", "detectors", "significance", "decoding", "reporting", "planning",
-        "commands", "cli", "__main__",
+        "batch", "commands", "cli", "__main__",
     ),
     "hil": (
         "plants", "wires", "vehicles", "sensors", "worlds", "fleet", "experiments.runs", "experiments.detectors",

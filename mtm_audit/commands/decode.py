@@ -11,12 +11,12 @@ from rich.progress import Progress
 
 from mtm_audit.commands.opened_key import KeySource, OpenedKey, opened_key
 from mtm_audit.commands.several import run_each
-from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.decoding import Decoding
+from mtm_audit.decoding.recorded import decode_recording
 from mtm_audit.decoding.settings import DecodeSettings
-from mtm_audit.decoding.speeds import at_speed, check_speed, decode_at_speeds, played
+from mtm_audit.decoding.speeds import check_speed
 from mtm_audit.detectors import make_detector
-from mtm_audit.ingest.films import film_compression, film_length
+from mtm_audit.ingest.films import film_length
 from mtm_audit.ingest.recording import read_recording
 from mtm_audit.ingest.source import Source, sources_of
 from mtm_audit.model.recording import Recording
@@ -150,33 +150,12 @@ def _decode(
 
 
 def _read(recording: Recording, key: Key, options: DecodeOptions, progress: Progress) -> tuple[Recording, Decoding]:
-    """The decoding, and the recording at the speed at which it was decoded; of a film with its compression.
-
-    That is what may have kept the message from being read, so it is not looked at when it was.
-    """
     task = progress.add_task("reading", total=1.0)
 
     def show(stage: str, fraction: float) -> None:
         progress.update(task, description=stage, completed=fraction)
 
-    given = options.settings.at
-    # What a person says of the recording's time comes before what the file says.
-    timed = replace(options.settings, at=recording.at if given is None else recording.begun_at(given))
-    tracks = recording.tracks
-    if options.speed is None:
-        speed, decoding = decode_at_speeds(tracks, key, timed, show)
-    else:
-        speed = options.speed
-        decoding = decode_tracks(played(tracks, speed), key, at_speed(timed, tracks, speed), show)
-    lost = recording.kind == "video" and decoding.verdict != "decoded"
-    shown = replace(
-        recording,
-        tracks=played(tracks, speed),
-        speed=speed,
-        speed_searched=options.speed is None,
-        compression=film_compression(recording.paths) if lost else None,
-    )
-    return shown, decoding
+    return decode_recording(recording, key, options.settings, options.speed, show)
 
 
 def _publish(options: DecodeOptions, opened: OpenedKey, recording: Recording, decoding: Decoding) -> str:
