@@ -125,6 +125,15 @@ def decode(
         bool, typer.Option("--json", help="Print JSON (docs/decode-json.md) instead of a table.")
     ] = False,
     plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw the decode (.png, .pdf, .svg).")] = None,
+    overlay: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.mp4", help="Draw what was seen and read over the film; FILE.png for one still of it."
+        ),
+    ] = None,
+    sheet: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw twelve pictures of the film with what was seen.")
+    ] = None,
     explain: Annotated[bool, typer.Option("--explain", help="Say stage by stage what was found.")] = False,
     profile: Annotated[
         Path | None, typer.Option(metavar="FILE", help="What mtm-audit profile learnt about this type of robot.")
@@ -167,6 +176,7 @@ def decode(
         from mtm_audit.decoding.settings import DecodeSettings
         from mtm_audit.detectors.matched.profile import load_profile
         from mtm_audit.model.recorded_at import RecordedAt
+        from mtm_audit.reporting.overlay.files import overlay_files
         from mtm_onboard.protocol.revocation import RevocationList, load_revocations
 
         known = None if profile is None else load_profile(profile)
@@ -181,7 +191,7 @@ def decode(
             DecodeOptions(
                 paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker,
                 reference=_names(reference), settings=settings, as_json=as_json, plot=plot, explain=explain,
-                reading=reading, frame_rate_hz=frame_rate, speed=played,
+                reading=reading, frame_rate_hz=frame_rate, speed=played, overlay=overlay_files(overlay, sheet),
             )
         )  # fmt: skip
     raise typer.Exit(code)
