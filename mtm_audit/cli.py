@@ -121,6 +121,15 @@ def decode(
     ] = False,
     plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw the decode (.png, .pdf, .svg).")] = None,
     force: Force = False,
+    overlay: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.mp4", help="Draw what was seen and read over the film; FILE.png for one still of it."
+        ),
+    ] = None,
+    sheet: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw twelve pictures of the film with what was seen.")
+    ] = None,
     explain: Annotated[bool, typer.Option("--explain", help="Say stage by stage what was found.")] = False,
     profile: Annotated[
         Path | None, typer.Option(metavar="FILE", help="What mtm-audit profile learnt about this type of robot.")
@@ -163,6 +172,7 @@ def decode(
         from mtm_audit.decoding.settings import DecodeSettings
         from mtm_audit.detectors.matched.profile import load_profile
         from mtm_audit.model.recorded_at import RecordedAt
+        from mtm_audit.reporting.overlay.files import overlay_files
         from mtm_onboard.protocol.revocation import RevocationList, load_revocations
 
         known = None if profile is None else load_profile(profile)
@@ -177,7 +187,8 @@ def decode(
             DecodeOptions(
                 paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker,
                 reference=_names(reference), settings=settings, as_json=as_json, plot=plot, explain=explain,
-                reading=reading, frame_rate_hz=frame_rate, speed=played, force=force,
+                reading=reading, frame_rate_hz=frame_rate, speed=played, overlay=overlay_files(overlay, sheet),
+                force=force,
             )
         )  # fmt: skip
     raise typer.Exit(code)

@@ -24,6 +24,7 @@ from mtm_audit.model.stage import StageError, stage
 from mtm_audit.readers.logs.options import ReadOptions
 from mtm_audit.readers.video.clock import EvenClock
 from mtm_audit.reporting.json_report import json_report
+from mtm_audit.reporting.overlay.files import OverlayFiles, check_pictures, draw_overlay
 from mtm_audit.reporting.remarks import remarks
 from mtm_audit.reporting.stages import Stage, stages_of_decoding, stages_of_recording, text_of_stages
 from mtm_audit.reporting.text import print_report
@@ -41,7 +42,7 @@ class DecodeOptions:
     """What the command line asked for; `plot` None draws nothing, `reading` is how to read logs.
 
     `frame_rate_hz` replaces the times of films; `speed` is how many times as fast the recording is played, None to
-    search for it.
+    search for it. `overlay` is what to draw over the film.
     """
 
     paths: tuple[Path, ...]
@@ -56,6 +57,7 @@ class DecodeOptions:
     frame_rate_hz: float | None = None
     speed: float | None = 1.0
     force: bool = False
+    overlay: OverlayFiles = field(default_factory=OverlayFiles)
 
 
 def run_decode(options: DecodeOptions) -> int:
@@ -72,10 +74,10 @@ def run_decode(options: DecodeOptions) -> int:
         stages.append(Stage("key", (f"{key.id}, scheme {key.scheme.name} (fingerprint {key.scheme.fingerprint})",)))
         with stage("recording"):
             sources = sources_of(options.paths)
+            check_pictures(options.overlay, sources[0])
     if len(sources) > 1:
-        return run_each(
-            sources, options.plot, options.as_json, lambda source: _report(options, opened, source, stages[:1])
-        )
+        single = (*(("--plot",) if options.plot else ()), *options.overlay.options)
+        return run_each(sources, single, options.as_json, lambda source: _report(options, opened, source, stages[:1]))
     text, code = _report(options, opened, sources[0], stages)
     sys.stdout.write(text)
     return code
@@ -167,6 +169,8 @@ def _publish(options: DecodeOptions, opened: OpenedKey, recording: Recording, de
         from mtm_audit.reporting.plot import draw_plot
 
         draw_plot(recording, decoding, options.plot)
+    if options.overlay.options:
+        _draw_overlay(options, recording, decoding)
     if options.as_json:
         return json_report(recording, decoding, warnings, basis)
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
@@ -174,6 +178,15 @@ def _publish(options: DecodeOptions, opened: OpenedKey, recording: Recording, de
     with console.capture() as captured:
         print_report(console, recording, decoding, warnings, basis)
     return captured.get()
+
+
+def _draw_overlay(options: DecodeOptions, recording: Recording, decoding: Decoding) -> None:
+    with _progress() as progress:
+        task = progress.add_task("drawing", total=recording.frames)
+        draw_overlay(
+            recording, decoding, options.overlay, options.tracker, options.frame_rate_hz,
+            lambda done: progress.update(task, completed=done),
+        )  # fmt: skip
 
 
 def _progress() -> Progress:

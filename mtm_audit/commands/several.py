@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 from mtm_audit.ingest.source import Source
 from mtm_onboard.protocol.errors import MtmError
@@ -11,15 +10,15 @@ _ABSENT, _MIXED = 3, 4
 
 
 def run_each(
-    sources: Sequence[Source], plot: Path | None, as_json: bool, report: Callable[[Source], tuple[str, int]]
+    sources: Sequence[Source], single: Sequence[str], as_json: bool, report: Callable[[Source], tuple[str, int]]
 ) -> int:
     """Print each report under its recording's name, or all as one JSON array; returns the exit code of all.
 
-    1 when one could not be read, 0 when all are decoded, 3 when all are absent, else 4. Raises MtmError when a plot is
-    wanted, which shows one recording.
+    1 when one could not be read, 0 when all are decoded, 3 when all are absent, else 4. Raises MtmError when one of
+    the `single` options is given, each of which shows one recording.
     """
-    if plot is not None:
-        raise MtmError(f"--plot draws one recording, and {len(sources)} are named; name one")
+    if single:
+        raise MtmError(f"{single[0]} draws one recording, and {len(sources)} are named; name one")
     codes: list[int] = []
     texts: list[str] = []
     for source in sources:

@@ -1,8 +1,6 @@
 """One picture of a decode: where the robots went, what each symbol scored, and how much evidence there is."""
 
 import math
-import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +11,11 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import MaxNLocator
 
 from mtm_audit.decoding.decoding import Decoding
+from mtm_audit.drawing.output import check_output_path
 from mtm_audit.model.recording import Recording
 from mtm_audit.model.track import Floats, Track
 from mtm_audit.reporting.figure_file import save_figure
 from mtm_audit.reporting.text import chance_sentence, verdict_sentence
-from mtm_onboard.protocol.errors import MtmError, WrongValueError
 
 SUFFIXES = (".png", ".pdf", ".svg")
 
@@ -31,16 +29,7 @@ _PLACES_NAMED = 24
 
 def check_plot_path(path: Path) -> None:
     """Raise MtmError unless a picture can be written to `path`; meant for the time before the long work."""
-    if path.suffix.lower() not in SUFFIXES:
-        raise WrongValueError(f"{path} is no picture format that can be drawn; end the name in {', '.join(SUFFIXES)}")
-    if path.is_dir():
-        raise MtmError(f"{path} is a folder; name a file for the picture")
-    try:
-        handle, probe = tempfile.mkstemp(prefix=f".{path.stem}-", dir=path.parent)
-    except OSError as error:
-        raise MtmError(f"cannot write {path}: {error.strerror}; choose a folder that exists and is writable") from error
-    os.close(handle)
-    os.unlink(probe)
+    check_output_path(path, SUFFIXES)
 
 
 def draw_plot(recording: Recording, decoding: Decoding, path: Path) -> None:

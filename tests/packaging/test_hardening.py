@@ -132,7 +132,11 @@ def test_each_link_drives_with_the_calls_the_service_may_make(tmp_path, link):
     client = BaseCommandClient(tmp_path / "r.base")
     moved, began_s = 0, time.monotonic()
     # A traced program on a busy machine misses many of its ticks.
-    while (moved < 50 or ticks_kept(tmp_path / "r.csv") < 20) and process.poll() is None and time.monotonic() - began_s < PATIENCE_S:
+    while (
+        (moved < 50 or ticks_kept(tmp_path / "r.csv") < 20)
+        and process.poll() is None
+        and time.monotonic() - began_s < PATIENCE_S
+    ):
         moved += client.send(BodyVelocity(0.1, 0.0, 0.0)) and (link == "none" or wire.controller.demand != STOP)
         wire.poll(time.monotonic() - began_s)
         time.sleep(0.01)
