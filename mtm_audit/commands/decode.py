@@ -24,9 +24,11 @@ from mtm_audit.model.stage import StageError, stage
 from mtm_audit.readers.logs.options import ReadOptions
 from mtm_audit.reporting.json_report import json_report
 from mtm_audit.reporting.remarks import remarks
+from mtm_audit.reporting.report.provenance import ReportRequest
 from mtm_audit.reporting.stages import Stage, stages_of_decoding, stages_of_recording, text_of_stages
 from mtm_audit.reporting.text import print_report
 from mtm_audit.tracking.registry import tracker
+from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key
 
 _PIPE_COLUMNS = 140
@@ -38,7 +40,7 @@ class DecodeOptions:
     """What the command line asked for; `plot` None draws nothing, `reading` is how to read logs.
 
     `frame_rate_hz` replaces the times of films; `speed` is how many times as fast the recording is played, None to
-    search for it.
+    search for it. `report` None writes no page.
     """
 
     paths: tuple[Path, ...]
@@ -52,6 +54,7 @@ class DecodeOptions:
     reading: ReadOptions = field(default_factory=ReadOptions)
     frame_rate_hz: float | None = None
     speed: float | None = 1.0
+    report: ReportRequest | None = None
 
 
 def run_decode(options: DecodeOptions) -> int:
@@ -69,6 +72,8 @@ def run_decode(options: DecodeOptions) -> int:
         with stage("recording"):
             sources = sources_of(options.paths)
     if len(sources) > 1:
+        if options.report is not None:
+            raise MtmError(f"--report is of one recording, and {len(sources)} are named; name one")
         return run_each(
             sources, options.plot, options.as_json, lambda source: _report(options, opened, source, stages[:1])
         )
@@ -86,6 +91,10 @@ def _check(options: DecodeOptions) -> None:
         from mtm_audit.reporting.plot import check_plot_path
 
         check_plot_path(options.plot)
+    if options.report is not None:
+        from mtm_audit.reporting.report.page import check_report_path
+
+        check_report_path(options.report.path)
 
 
 @contextmanager
@@ -110,7 +119,7 @@ def _report(options: DecodeOptions, opened: OpenedKey, source: Source, stages: l
         # Beside JSON the explanation must not get into what a program reads.
         sys.stderr.write(explanation)
         explanation = ""
-    return explanation + _publish(options, opened, recording, decoding), EXIT_CODES[decoding.verdict]
+    return explanation + _publish(options, opened, recording, decoding, stages), EXIT_CODES[decoding.verdict]
 
 
 def _decode(
@@ -171,8 +180,10 @@ def _read(recording: Recording, key: Key, options: DecodeOptions, progress: Prog
     return shown, decoding
 
 
-def _publish(options: DecodeOptions, opened: OpenedKey, recording: Recording, decoding: Decoding) -> str:
-    """Draw what is to be drawn; returns what is to be printed."""
+def _publish(
+    options: DecodeOptions, opened: OpenedKey, recording: Recording, decoding: Decoding, stages: Sequence[Stage]
+) -> str:
+    """Draw and write what is to be drawn; returns what is to be printed."""
     key_warning = () if opened.key.warning is None else (opened.key.warning,)
     warnings = (*remarks(recording, decoding), *key_warning)
     basis = opened.basis(recording, decoding, stated=options.settings.at is not None)
@@ -180,6 +191,13 @@ def _publish(options: DecodeOptions, opened: OpenedKey, recording: Recording, de
         from mtm_audit.reporting.plot import draw_plot
 
         draw_plot(recording, decoding, options.plot)
+    if options.report is not None:
+        from mtm_audit.reporting.report.page import write_report
+
+        write_report(
+            options.report, recording, decoding, warnings=warnings, basis=basis,
+            stages=[*stages, *stages_of_decoding(decoding)], tracker=options.tracker,
+        )  # fmt: skip
     if options.as_json:
         return json_report(recording, decoding, warnings, basis)
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
