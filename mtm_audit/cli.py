@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mtm_audit.commands.errors import reported
+from mtm_audit.commands.force import Force
 
 if TYPE_CHECKING:
     from mtm_audit.readers.logs.options import ReadOptions
@@ -129,6 +130,7 @@ def decode(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE.html", help="Write a page to hand on (docs/report.md).")
     ] = None,
+    force: Force = False,
     explain: Annotated[bool, typer.Option("--explain", help="Say stage by stage what was found.")] = False,
     profile: Annotated[
         Path | None, typer.Option(metavar="FILE", help="What mtm-audit profile learnt about this type of robot.")
@@ -189,7 +191,7 @@ def decode(
             DecodeOptions(
                 paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker,
                 reference=_names(reference), settings=settings, as_json=as_json, plot=plot, explain=explain,
-                reading=reading, frame_rate_hz=frame_rate, speed=played,
+                reading=reading, frame_rate_hz=frame_rate, speed=played, force=force,
                 report=None if report is None else requested(report, context.find_root().obj, inputs),
             )
         )  # fmt: skip
@@ -203,6 +205,7 @@ def learn_profile(
     ],
     key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
     out: Annotated[Path, typer.Option(metavar="FILE.profile", help="Where to write what was learnt.")],
+    force: Force = False,
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
@@ -234,7 +237,7 @@ def learn_profile(
 
         settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
         reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
-        run_profile(ProfileOptions(tuple(paths), key, out, tracker, _names(reference), settings, reading))
+        run_profile(ProfileOptions(tuple(paths), key, out, tracker, _names(reference), settings, reading, force))
 
 
 @app.command("journal")
@@ -247,12 +250,13 @@ def show_journal(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="Draw commands and lateness (.png, .pdf, .svg).")
     ] = None,
+    force: Force = False,
 ) -> None:
     """Say what a robot's journal tells: message and start, ticks, lateness, limits, noise and events."""
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.journal import run_journal
 
-        run_journal(path, as_json=as_json, plot=plot, key=key)
+        run_journal(path, as_json=as_json, plot=plot, key=key, force=force)
 
 
 @app.command()
@@ -280,6 +284,7 @@ def plan(
         Path | None, typer.Option(metavar="FILE.toml", help="Scheme file for mtm-onboard keygen --scheme.")
     ] = None,
     plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw accuracy over T.")] = None,
+    force: Force = False,
 ) -> None:
     """Find the fastest scheme for a payload and a target accuracy, from measured accuracies (docs/planning.md).
 
@@ -295,7 +300,7 @@ def plan(
 
         problem = Problem(bits, accuracy, tuple(alphabet) if alphabet else None, measured_only)
         chosen = None if strategy is None else strategy.value
-        code = run_plan(PlanOptions(table, problem, rate, like, chosen, check, plot, out))
+        code = run_plan(PlanOptions(table, problem, rate, like, chosen, check, plot, out, force))
     raise typer.Exit(code)
 
 

@@ -34,12 +34,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
 
 
-def _run(arguments: Sequence[str] | None) -> int:
+def parser_of() -> argparse.ArgumentParser:
+    """The command line of all commands."""
     parser = argparse.ArgumentParser(prog="mtm-onboard", description=import_module("mtm_onboard").__doc__)
     subparsers = parser.add_subparsers(required=True, metavar="command")
     for command in _COMMANDS:
         import_module(command).add_parser(subparsers)
-    args = parser.parse_args(arguments)
+    return parser
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    args = parser_of().parse_args(arguments)
 
     from mtm_onboard.protocol.errors import MtmError
 

@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from hil.commands.options import CELLS_FOLDER, Cells, FirstSeed, OutCsv, Workers, reported_console
+from mtm_audit.commands.force import Force
 
 codecs = typer.Typer(help="Measure what encoders leave of a message in a film.", no_args_is_help=True)
 
@@ -17,10 +18,11 @@ def _evidence(
     seed: FirstSeed = _FIRST_SEED,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "codecs.jsonl",
 ) -> None:
     """Film four robots, encode the film as cameras and programs do, and decode each copy."""
-    with reported_console() as console:
+    with reported_console("mtm-hil codecs evidence", out, force=force) as console:
         from hil.commands.codecs import CodecOptions, evidence
 
         evidence(CodecOptions(rollouts, seed, workers, out, cells), console)
@@ -32,10 +34,11 @@ def _motion(
     seed: FirstSeed = _FIRST_SEED,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "codecs_motion.jsonl",
 ) -> None:
     """Film a marker that moves by parts of a pixel, encode the film, and track each copy."""
-    with reported_console() as console:
+    with reported_console("mtm-hil codecs motion", out, force=force) as console:
         from hil.commands.codecs import CodecOptions, motion
 
         motion(CodecOptions(films, seed, workers, out, cells), console)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from hil.commands.options import CELLS_FOLDER, Cells, CellSeed, FirstSeed, OutCsv, Workers, reported_console
+from mtm_audit.commands.force import Force
 
 
 class FrameName(StrEnum):
@@ -19,11 +20,12 @@ class FrameName(StrEnum):
 
 def calibrate(
     rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each slip and window length.")] = 20,
-    out: Annotated[Path | None, typer.Option(help="The plant's file; that of the package by default.")] = None,
+    out: Annotated[Path | None, typer.Option(help="A plant's file to write as well.")] = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "calibrate.jsonl",
 ) -> None:
     """Fit the simulated chassis' wheel slip to the paper's margins."""
-    with reported_console() as console:
+    with reported_console("mtm-hil calibrate", out, force=force) as console:
         from hil.commands.calibrate import calibrate as run
 
         run(rollouts, out, cells, console)
@@ -41,13 +43,14 @@ def bench(
     ] = None,
     ticks: Annotated[int, typer.Option(min=10, help="With --plants: window of a symbol.")] = 100,
     out: OutCsv = None,
+    force: Force = False,
     plot: Annotated[Path | None, typer.Option(help="A picture to draw: accuracy over the window length.")] = None,
     cells: Cells = CELLS_FOLDER / "bench.jsonl",
 ) -> None:
     """Compare the paper's detector and ours with the genie, an oracle, on the same recordings."""
     if plants is not None and (quick or plot is not None):
         raise typer.BadParameter("--quick and --plot do not go with --plants; take fewer --rollouts for a first look")
-    with reported_console() as console:
+    with reported_console("mtm-hil bench", out, plot, force=force) as console:
         if plants is not None:
             from hil.commands.bench_plants import PlantsOptions, bench_plants
             from hil.experiments.plants.rollout import PlantJob
@@ -63,15 +66,17 @@ def bench(
 
 
 def false_alarms(
+    *,
     decodes: Annotated[int, typer.Option("-n", min=4, help="Decodes with a wrong key, and as many without.")] = 3000,
     detector: Annotated[str, typer.Option(help="Which detector decodes.")] = "matched",
     seed: FirstSeed = 500_000,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "false-alarms.jsonl",
 ) -> None:
     """Decode recordings without a message under the given key, and compare the p-values with a uniform law."""
-    with reported_console() as console:
+    with reported_console("mtm-hil false-alarms", out, force=force) as console:
         from hil.commands.false_alarms import false_alarms as run
 
         run(decodes, detector, seed, workers, out=out, cells=cells, console=console)
@@ -82,10 +87,11 @@ def messages(
     seed: FirstSeed = 700_000,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "messages.jsonl",
 ) -> None:
     """Count how many framed messages are received: whole, with a known time, and through occlusions."""
-    with reported_console() as console:
+    with reported_console("mtm-hil messages", out, force=force) as console:
         from hil.commands.messages import messages as run
 
         run(rollouts, seed, workers, out, cells, console)
@@ -96,10 +102,11 @@ def cameras(
     seed: CellSeed = 900_000,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "cameras.jsonl",
 ) -> None:
     """Measure the evidence left by a camera that shakes, pans and rolls, and by markers at an angle."""
-    with reported_console() as console:
+    with reported_console("mtm-hil cameras", out, force=force) as console:
         from hil.commands.cameras import cameras as run
 
         run(rollouts, seed, workers, out, cells, console)
@@ -110,10 +117,11 @@ def frames(
     seed: CellSeed = 0,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "frames.jsonl",
 ) -> None:
     """Decode noisy and attacked frames: how often a wrong payload passes the check, and which decoder reads most."""
-    with reported_console() as console:
+    with reported_console("mtm-hil frames", out, force=force) as console:
         from hil.commands.frames import frames as run
 
         run(count, seed, workers, out, cells, console)
@@ -122,10 +130,11 @@ def frames(
 def shim(
     rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts, each run with Python and with the shim.")] = 100,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "shim.jsonl",
 ) -> None:
     """Play the message with the microcontroller's C code, in the loop, and compare with Python."""
-    with reported_console() as console:
+    with reported_console("mtm-hil shim", out, force=force) as console:
         from hil.commands.shim import shim as run
 
         run(rollouts, out, cells, console)
@@ -136,10 +145,11 @@ def robustness(
     seed: FirstSeed = 600_000,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "robustness.jsonl",
 ) -> None:
     """Decode the same rollouts under uncalibrated cameras, frame times and clocks."""
-    with reported_console() as console:
+    with reported_console("mtm-hil robustness", out, force=force) as console:
         from hil.commands.robustness import robustness as run
 
         run(rollouts, seed, workers, out, cells, console)
@@ -152,6 +162,7 @@ def sweep(
     ],
     *,
     out: Annotated[Path, typer.Option(help="The accuracy table to write, for mtm-audit plan.")],
+    force: Force = False,
     rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each M and window.")] = 50,
     alphabet: Annotated[
         list[int] | None, typer.Option(metavar="M", help="Alphabet size; may be repeated (default: 4, 16, 64).")
@@ -170,7 +181,7 @@ def sweep(
     cells: Cells = CELLS_FOLDER / "sweep.jsonl",
 ) -> None:
     """Measure how often a symbol is right, by channel, alphabet size and window length."""  # fmt: skip
-    with reported_console() as console:
+    with reported_console("mtm-hil sweep", out, force=force) as console:
         from hil.commands.sweep import SweepOptions
         from hil.commands.sweep import sweep as run
 
@@ -209,10 +220,11 @@ def real(
     seed: FirstSeed = 800_000,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "real.jsonl",
 ) -> None:
     """Add messages to recorded motion, through plants drawn at random, and decode it."""
-    with reported_console() as console:
+    with reported_console("mtm-hil real", out, force=force) as console:
         from hil.commands.real import RealOptions, band_of
         from hil.commands.real import real as run
 
@@ -249,9 +261,10 @@ def identify(
     summary: Annotated[str, typer.Option(help="What kind of robot it is, for the plant file.")] = "identified",
     source: Annotated[str, typer.Option(help="Where the logs come from, for the plant file.")] = "",
     out: OutCsv = None,
+    force: Force = False,
 ) -> None:
     """Measure how a robot follows its commands, from what was commanded and how it moved."""
-    with reported_console() as console:
+    with reported_console("mtm-hil identify", out, plant, profile, force=force) as console:
         from hil.commands.identify import IdentifyOptions
         from hil.commands.identify import identify as run
 
@@ -272,10 +285,11 @@ def faults(
     seed: Annotated[int, typer.Option(min=0, help="The first run's seed.")] = 0,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "faults.jsonl",
 ) -> None:
     """Run a robot under every fault of its wire, alone and with a lost link: stops, stale commands, the message."""
-    with reported_console() as console:
+    with reported_console("mtm-hil faults", out, force=force) as console:
         from hil.commands.faults import faults as run
 
         if not run(seeds, seed, workers, out, cells, console):
@@ -287,10 +301,11 @@ def fuzz(
     seed: CellSeed = 0,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "fuzz.jsonl",
 ) -> None:
     """Feed damaged traffic to both ends of every wire, and count the messages that they accept."""
-    with reported_console() as console:
+    with reported_console("mtm-hil fuzz", out, force=force) as console:
         from hil.commands.fuzz import fuzz as run
 
         if not run(inputs, seed, workers, out, cells, console):
@@ -302,13 +317,14 @@ def forgeries(
     seed: CellSeed = 0,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "forgeries.jsonl",
 ) -> None:
     """Forge messages of keys as they are made by default: splices, journals, learnt codebooks, replays, relays.
 
     Stop it at any time: what is finished is kept, and the next run goes on. About 3 s a try and core.
     """
-    with reported_console() as console:
+    with reported_console("mtm-hil forgeries", out, force=force) as console:
         from hil.commands.forgeries import forgeries as run
 
         if not run(tries, seed, workers, out, cells, console):
@@ -320,9 +336,10 @@ def endurance(
     checkpoints: Annotated[int, typer.Option(min=1, help="Number of checkpoints, evenly spaced up to the end.")] = 24,
     seed: Annotated[int, typer.Option(min=0, help="Decides where the robot goes and how its wheels slip.")] = 0,
     out: OutCsv = None,
+    force: Force = False,
 ) -> None:
     """Run one robot for a day in simulated time: memory, journal, ticks, and the message in each last minute."""
-    with reported_console() as console:
+    with reported_console("mtm-hil endurance", out, force=force) as console:
         from hil.commands.endurance import endurance as run
 
         run(hours, checkpoints, seed, out, console)

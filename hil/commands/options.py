@@ -46,9 +46,15 @@ def require_message_or_none(message: int | None, no_message: bool) -> None:
 
 
 @contextmanager
-def reported_console() -> Iterator["Console"]:
-    """Yield a console; an error in the block is printed in one sentence and ends the program with its exit code."""
+def reported_console(command: str = "mtm-hil", *outputs: Path | None, force: bool = False) -> Iterator["Console"]:
+    """Yield a console; an error in the block is printed in one sentence and ends the program with its exit code.
+
+    So is that of a file among `outputs`, None being one that was not asked for, which `command` did not make.
+    """
     from rich.console import Console
 
     with reported("mtm-hil", "no half-written result is left"):
+        from mtm_onboard.protocol.output_file import check_outputs
+
+        check_outputs(command, *outputs, force=force)
         yield Console()

@@ -47,6 +47,7 @@ class RealOptions:
 
 def real(options: RealOptions, console: Console) -> None:
     """Measure, print and, where asked, write the table; raises MtmError when nothing in the folder can be used."""
+    CellStore.check(options.cells)
     files = _files(options.folder)
     jobs = [_job(options, frame, sigma) for sigma in options.sigmas for frame in options.frames]
     rows: list[tuple[object, ...]] = []

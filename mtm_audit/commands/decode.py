@@ -30,6 +30,7 @@ from mtm_audit.reporting.text import print_report
 from mtm_audit.tracking.registry import tracker
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key
+from mtm_onboard.protocol.output_file import check_outputs
 
 _PIPE_COLUMNS = 140
 EXIT_CODES = {"decoded": 0, "absent": 3, "inconclusive": 4}
@@ -55,6 +56,7 @@ class DecodeOptions:
     frame_rate_hz: float | None = None
     speed: float | None = 1.0
     report: ReportRequest | None = None
+    force: bool = False
 
 
 def run_decode(options: DecodeOptions) -> int:
@@ -87,14 +89,16 @@ def _check(options: DecodeOptions) -> None:
     make_detector(options.settings.detector, options.settings.profile)
     tracker(options.tracker)
     check_speed(1.0 if options.speed is None else options.speed)
+    page = None if options.report is None else options.report.path
+    check_outputs("mtm-audit decode", options.plot, page, force=options.force)
     if options.plot is not None:
         from mtm_audit.reporting.plot import check_plot_path
 
         check_plot_path(options.plot)
-    if options.report is not None:
+    if page is not None:
         from mtm_audit.reporting.report.page import check_report_path
 
-        check_report_path(options.report.path)
+        check_report_path(page)
 
 
 @contextmanager
@@ -201,7 +205,8 @@ def _publish(
     if options.as_json:
         return json_report(recording, decoding, warnings, basis)
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS)
+    # What users name is printed as it is: a track may be called body[left].
+    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS, markup=False, emoji=False)
     with console.capture() as captured:
         print_report(console, recording, decoding, warnings, basis)
     return captured.get()

@@ -8,9 +8,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from mtm_audit.reporting.figure_file import save_figure
 from mtm_audit.reporting.journal_summary import AXES
 from mtm_audit.reporting.panels.style import TEXT_COLOUR, plain
-from mtm_audit.reporting.plot import check_plot_path, save_figure
+from mtm_audit.reporting.plot import check_plot_path
 from mtm_audit.reporting.subject import dated, now
 from mtm_onboard.protocol.journal_file import JournalHeader, JournalRecord
 
@@ -50,7 +51,7 @@ def draw_journal(record: JournalRecord, journal: Path, path: Path) -> None:
     lateness.set(xscale="log", yscale="log", xlabel="lateness of a tick [ms]", ylabel="ticks")
     lateness.set_ylim(bottom=0.5)
     lateness.spines[["top", "right"]].set_visible(False)
-    save_figure(figure, path)
+    save_figure(figure, path, "mtm-audit journal")
 
 
 def _subject(header: JournalHeader, journal: Path) -> str:

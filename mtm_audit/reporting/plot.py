@@ -2,7 +2,6 @@
 
 import os
 import tempfile
-import warnings
 from pathlib import Path
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -11,6 +10,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.model.recording import Recording
+from mtm_audit.reporting.figure_file import save_figure
 from mtm_audit.reporting.panels.evidence import draw_evidence
 from mtm_audit.reporting.panels.scores import draw_margins, draw_scores
 from mtm_audit.reporting.panels.style import TEXT_COLOUR, VERDICT_COLOURS, plain
@@ -18,7 +18,6 @@ from mtm_audit.reporting.panels.tracks import draw_tracks
 from mtm_audit.reporting.still import still_of
 from mtm_audit.reporting.subject import now, subject_line
 from mtm_audit.reporting.text import chance_sentence, verdict_sentence
-from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
 
 SUFFIXES = (".png", ".pdf", ".svg")
@@ -28,13 +27,8 @@ def check_plot_path(path: Path) -> None:
     """Raise MtmError unless a picture can be written to `path`; meant for the time before the long work."""
     if path.suffix.lower() not in SUFFIXES:
         raise MtmError(f"{path} is no picture format that can be drawn; end the name in {', '.join(SUFFIXES)}")
-    check_writable(path, "picture")
-
-
-def check_writable(path: Path, what: str) -> None:
-    """Raise MtmError unless a file can be written to `path`, which is left as it is."""
     if path.is_dir():
-        raise MtmError(f"{path} is a folder; name a file for the {what}")
+        raise MtmError(f"{path} is a folder; name a file for the picture")
     try:
         handle, probe = tempfile.mkstemp(prefix=f".{path.stem}-", dir=path.parent)
     except OSError as error:
@@ -65,12 +59,4 @@ def draw_plot(recording: Recording, decoding: Decoding, path: Path) -> None:
         draw_scores(scores, decoding)
         draw_evidence(evidence, decoding)
         draw_margins(margins, decoding)
-    save_figure(figure, path)
-
-
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write the figure whole or not at all, in the format of its suffix."""
-    with replacing(path) as temporary, warnings.catch_warnings():
-        # Names in scripts that the font lacks are drawn as boxes, and that is seen.
-        warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
+    save_figure(figure, path, "mtm-audit decode")

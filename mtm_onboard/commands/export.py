@@ -24,7 +24,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--key", required=True, type=Path, help="the key file")
     parser.add_argument("--channel", help="the scheme's channel that the robot plays; may be left out if there is one")
     add_content(parser)
-    parser.add_argument("-o", "--out", required=True, type=Path, help="the image to write; it replaces an older one")
+    parser.add_argument("-o", "--out", required=True, type=Path, help="the image to write")
+    parser.add_argument("--force", action="store_true", help="replace a file that is no image; a key file never is")
     parser.add_argument("--no-repeat", action="store_true", help="fixed schedule: play the message once")
     length = parser.add_mutually_exclusive_group()
     length.add_argument("--messages", type=int, metavar="N", help="rolling schedule: how many messages (1)")
@@ -50,16 +51,19 @@ def _add_seal(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the image with mode 0600: it holds no secret, but whoever has it can play the message."""
-    from mtm_onboard.firmware.image import MAX_MESSAGES, channel_image, image_bytes, tagged
+    from mtm_onboard.firmware.image import IMAGE_MAGIC, MAX_MESSAGES, channel_image, image_bytes, tagged
+    from mtm_onboard.firmware.seal import SEAL_MAGIC
     from mtm_onboard.protocol import load_key
     from mtm_onboard.protocol.atomicfile import replacing
     from mtm_onboard.protocol.framing import channel_symbols
+    from mtm_onboard.protocol.output_file import check_outputs
     from mtm_onboard.runtime.message import message_of
 
     if args.device_key is None and any(
         value is not None for value in (args.device_channel, args.counter, args.noise_limit)
     ):
         args.usage_error("a seal needs --device-key")
+    check_outputs("mtm-onboard export", args.out, force=args.force, begins=(IMAGE_MAGIC, SEAL_MAGIC))
     key = load_key(args.key)
     scheme = key.scheme
     channel = _channel(scheme, args.channel)

@@ -287,6 +287,7 @@ def test_a_folder_in_the_place_of_a_result_is_left_alone(tmp_path, key, capsys):
     wanted = ["export", "--key", key, "--channel", "robot0", "--message", 178, "-o", tmp_path]
     assert main(list(map(str, wanted))) == 1
     assert "name a file" in capsys.readouterr().err
+    wanted[-1] = tmp_path / "new"
     assert main([*map(str, wanted), "--span", "1e308"]) == 1
     assert "shorter" in capsys.readouterr().err
     assert not list(tmp_path.parent.glob(f".{tmp_path.name}-*"))

@@ -15,7 +15,6 @@ from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.model.recording import Recording
 from mtm_audit.reporting.advice import advice
 from mtm_audit.reporting.basis import Basis
-from mtm_audit.reporting.plot import check_writable
 from mtm_audit.reporting.report.figures import drawings_of
 from mtm_audit.reporting.report.limits import limits, shown
 from mtm_audit.reporting.report.provenance import ReportRequest, provenance_of
@@ -24,16 +23,16 @@ from mtm_audit.reporting.subject import files_named, now, subject_line
 from mtm_audit.reporting.text import chance_sentence, facts, rests_on, table_of, verdict_sentence
 from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.output_file import mark_of
 
 SUFFIXES = (".html", ".htm")
 _TEMPLATE = "report.html.jinja"
 
 
 def check_report_path(path: Path) -> None:
-    """Raise MtmError unless a report can be written to `path`; meant for the time before the long work."""
+    """Raise MtmError for a name that no browser would take for a page."""
     if path.suffix.lower() not in SUFFIXES:
         raise MtmError(f"{path} is no name for a report, which is a page; end it in {' or '.join(SUFFIXES)}")
-    check_writable(path, "report")
 
 
 def write_report(
@@ -72,6 +71,7 @@ def report_html(
     provenance = provenance_of(request, recording.paths)
     helps = advice(recording, decoding)
     page: dict[str, Any] = {
+        "maker": mark_of("mtm-audit decode"),
         "verdict": decoding.verdict,
         "headline": verdict_sentence(decoding),
         "chance": chance_sentence(decoding),
@@ -112,4 +112,4 @@ def _plain_table(table: Table) -> tuple[list[str], list[list[str]]]:
 
 
 def _plain(cell: object) -> str:
-    return cell.plain if isinstance(cell, Text) else Text.from_markup(str(cell)).plain
+    return cell.plain if isinstance(cell, Text) else str(cell)

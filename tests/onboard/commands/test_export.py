@@ -148,10 +148,10 @@ def test_a_framed_message_is_written_as_each_slot_and_day_has_it(tmp_path):
     ],
 )
 def test_bad_input_leaves_an_older_image_alone(key_path, options, words, capsys):
-    (key_path.parent / "image.bin").write_bytes(b"older")
+    (key_path.parent / "image.bin").write_bytes(b"MTMI older")
     code, out = export(key_path, *options)
     error = capsys.readouterr().err
     assert code == 1
     assert words in error
     assert error.count("\n") == 1
-    assert out.read_bytes() == b"older"
+    assert out.read_bytes() == b"MTMI older"
