@@ -63,6 +63,7 @@ def _every_command(
 
 @app.command()
 def decode(
+    context: typer.Context,
     paths: Annotated[
         list[Path],
         typer.Argument(metavar="PATH", help="Videos, logs, motion-capture files, or a folder of those or of pictures."),
@@ -120,6 +121,9 @@ def decode(
         bool, typer.Option("--json", help="Print JSON (docs/decode-json.md) instead of a table.")
     ] = False,
     plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw the decode (.png, .pdf, .svg).")] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE.html", help="Write a page to hand on (docs/report.md).")
+    ] = None,
     force: Force = False,
     overlay: Annotated[
         Path | None,
@@ -173,6 +177,7 @@ def decode(
         from mtm_audit.detectors.matched.profile import load_profile
         from mtm_audit.model.recorded_at import RecordedAt
         from mtm_audit.reporting.overlay.files import overlay_files
+        from mtm_audit.reporting.report.provenance import requested
         from mtm_onboard.protocol.revocation import RevocationList, load_revocations
 
         known = None if profile is None else load_profile(profile)
@@ -183,12 +188,15 @@ def decode(
         )  # fmt: skip
         reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
         played = None if search_speed else 1.0 if speed is None else speed
+        inputs = {
+            "key": key, "anchor": anchor, "disclosed key": disclosed, "profile": profile, "revocations": revoked,
+        }  # fmt: skip
         code = run_decode(
             DecodeOptions(
                 paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker,
                 reference=_names(reference), settings=settings, as_json=as_json, plot=plot, explain=explain,
                 reading=reading, frame_rate_hz=frame_rate, speed=played, overlay=overlay_files(overlay, sheet),
-                force=force,
+                report=None if report is None else requested(report, context.find_root().obj, inputs), force=force,
             )
         )  # fmt: skip
     raise typer.Exit(code)
@@ -475,4 +483,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command; leaves through SystemExit with the exit code."""
     # Many small products: threads cost twenty times what they save when the machine is busy. Must come before numpy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    app(args=arguments, prog_name="mtm-audit")
+    app(args=arguments, prog_name="mtm-audit", obj=arguments)

@@ -26,6 +26,7 @@ from mtm_audit.readers.video.clock import EvenClock
 from mtm_audit.reporting.json_report import json_report
 from mtm_audit.reporting.overlay.files import OverlayFiles, check_pictures, draw_overlay
 from mtm_audit.reporting.remarks import remarks
+from mtm_audit.reporting.report.provenance import ReportRequest
 from mtm_audit.reporting.stages import Stage, stages_of_decoding, stages_of_recording, text_of_stages
 from mtm_audit.reporting.text import print_report
 from mtm_audit.tracking.registry import tracker
@@ -42,7 +43,7 @@ class DecodeOptions:
     """What the command line asked for; `plot` None draws nothing, `reading` is how to read logs.
 
     `frame_rate_hz` replaces the times of films; `speed` is how many times as fast the recording is played, None to
-    search for it. `overlay` is what to draw over the film.
+    search for it. `overlay` is what to draw over the film; `report` None writes no page.
     """
 
     paths: tuple[Path, ...]
@@ -56,6 +57,7 @@ class DecodeOptions:
     reading: ReadOptions = field(default_factory=ReadOptions)
     frame_rate_hz: float | None = None
     speed: float | None = 1.0
+    report: ReportRequest | None = None
     force: bool = False
     overlay: OverlayFiles = field(default_factory=OverlayFiles)
 
@@ -76,7 +78,8 @@ def run_decode(options: DecodeOptions) -> int:
             sources = sources_of(options.paths)
             check_pictures(options.overlay, sources[0])
     if len(sources) > 1:
-        single = (*(("--plot",) if options.plot else ()), *options.overlay.options)
+        report = ("--report",) if options.report else ()
+        single = (*(("--plot",) if options.plot else ()), *report, *options.overlay.options)
         return run_each(sources, single, options.as_json, lambda source: _report(options, opened, source, stages[:1]))
     text, code = _report(options, opened, sources[0], stages)
     sys.stdout.write(text)
@@ -91,11 +94,16 @@ def _check(options: DecodeOptions) -> None:
         check_speed(1.0 if options.speed is None else options.speed)
         if options.frame_rate_hz is not None:
             EvenClock(options.frame_rate_hz)
-    check_outputs("mtm-audit decode", options.plot, force=options.force)
+    page = None if options.report is None else options.report.path
+    check_outputs("mtm-audit decode", options.plot, page, force=options.force)
     if options.plot is not None:
         from mtm_audit.reporting.plot import check_plot_path
 
         check_plot_path(options.plot)
+    if page is not None:
+        from mtm_audit.reporting.report.page import check_report_path
+
+        check_report_path(page)
 
 
 @contextmanager
@@ -120,7 +128,7 @@ def _report(options: DecodeOptions, opened: OpenedKey, source: Source, stages: l
         # Beside JSON the explanation must not get into what a program reads.
         sys.stderr.write(explanation)
         explanation = ""
-    return explanation + _publish(options, opened, recording, decoding), EXIT_CODES[decoding.verdict]
+    return explanation + _publish(options, opened, recording, decoding, stages), EXIT_CODES[decoding.verdict]
 
 
 def _decode(
@@ -160,8 +168,10 @@ def _read(recording: Recording, key: Key, options: DecodeOptions, progress: Prog
     return decode_recording(recording, key, options.settings, options.speed, show)
 
 
-def _publish(options: DecodeOptions, opened: OpenedKey, recording: Recording, decoding: Decoding) -> str:
-    """Draw what is to be drawn; returns what is to be printed."""
+def _publish(
+    options: DecodeOptions, opened: OpenedKey, recording: Recording, decoding: Decoding, stages: Sequence[Stage]
+) -> str:
+    """Draw and write what is to be drawn; returns what is to be printed."""
     key_warning = () if opened.key.warning is None else (opened.key.warning,)
     warnings = (*remarks(recording, decoding), *key_warning)
     basis = opened.basis(recording, decoding, stated=options.settings.at is not None)
@@ -171,10 +181,18 @@ def _publish(options: DecodeOptions, opened: OpenedKey, recording: Recording, de
         draw_plot(recording, decoding, options.plot)
     if options.overlay.options:
         _draw_overlay(options, recording, decoding)
+    if options.report is not None:
+        from mtm_audit.reporting.report.page import write_report
+
+        write_report(
+            options.report, recording, decoding, warnings=warnings, basis=basis,
+            stages=[*stages, *stages_of_decoding(decoding)], tracker=options.tracker,
+        )  # fmt: skip
     if options.as_json:
         return json_report(recording, decoding, warnings, basis)
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS)
+    # What users name is printed as it is: a track may be called body[left].
+    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS, markup=False, emoji=False)
     with console.capture() as captured:
         print_report(console, recording, decoding, warnings, basis)
     return captured.get()

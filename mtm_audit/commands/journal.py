@@ -34,7 +34,7 @@ def run_journal(path: Path, *, as_json: bool, plot: Path | None, key: Path | Non
     if plot is not None:
         from mtm_audit.reporting.journal_plot import draw_journal
 
-        draw_journal(record, plot)
+        draw_journal(record, path, plot)
     if as_json:
         sys.stdout.write(json.dumps(summary.as_table(), indent=2, allow_nan=False) + "\n")
     else:

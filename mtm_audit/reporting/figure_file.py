@@ -1,5 +1,6 @@
 """Figures as files that carry the mark of the command that drew them."""
 
+import warnings
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -17,5 +18,7 @@ def save_figure(figure: Figure, path: Path, command: str) -> None:
     Raises MtmError when it cannot be written, or a key file stands there.
     """
     suffix = path.suffix.lower().removeprefix(".")
-    with replacing(path) as temporary:
+    with replacing(path) as temporary, warnings.catch_warnings():
+        # Names in scripts that the font lacks are drawn as boxes, and that is seen.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.savefig(temporary, format=suffix, metadata={_MAKER_FIELDS[suffix]: mark_of(command)})
