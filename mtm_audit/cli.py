@@ -134,13 +134,20 @@ def decode(
     sheet: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="Draw twelve pictures of the film with what was seen.")
     ] = None,
+    together: Annotated[
+        bool,
+        typer.Option("--together", help="All recordings show one message (docs/decoding.md)."),
+    ] = False,
     explain: Annotated[bool, typer.Option("--explain", help="Say stage by stage what was found.")] = False,
     profile: Annotated[
         Path | None, typer.Option(metavar="FILE", help="What mtm-audit profile learnt about this type of robot.")
     ] = None,
     at: Annotated[
         str | None,
-        typer.Option(metavar="TIME", help="When the recording began (2026-01-31T12:00:00Z), for a rolling schedule."),
+        typer.Option(
+            metavar="TIME",
+            help="When the recording began (2026-01-31T12:00:00Z), for a rolling schedule.",
+        ),
     ] = None,
     at_error: Annotated[
         float,
@@ -169,7 +176,10 @@ def decode(
         raise typer.BadParameter("is given; leave it or --search-speed out", param_hint="--speed")
     if (key is None) == (anchor is None and disclosed is None) or (anchor is None) != (disclosed is None):
         raise typer.BadParameter("give a key file, or else an anchor and a disclosed key", param_hint="--key")
-    onset_s, pairs, at_unix_s = _onset_s(onset), _pairs(assign or []), _unix_s(at)
+    onset_s, pairs, times = _onset_s(onset), _pairs(assign or []), [] if at is None else at.split(",")
+    began_unix_s = [_unix_s(text.strip()) for text in times]
+    if len(began_unix_s) > 1 and not together:
+        raise typer.BadParameter("is one time unless recordings are read --together", param_hint="--at")
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.decode import DecodeOptions, run_decode
         from mtm_audit.commands.opened_key import KeySource
@@ -181,10 +191,11 @@ def decode(
         from mtm_onboard.protocol.revocation import RevocationList, load_revocations
 
         known = None if profile is None else load_profile(profile)
-        recorded = None if at_unix_s is None else RecordedAt(at_unix_s, at_error)
+        began = [RecordedAt(unix_s, at_error) for unix_s in began_unix_s if unix_s is not None]
         settings = DecodeSettings(
             detector=detector, onset_s=onset_s, decoys=decoys, threshold=threshold, assignment=pairs, profile=known,
-            at=recorded, revoked=RevocationList() if revoked is None else load_revocations(revoked),
+            at=began[0] if began else None,
+            revoked=RevocationList() if revoked is None else load_revocations(revoked),
         )  # fmt: skip
         reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
         played = None if search_speed else 1.0 if speed is None else speed
@@ -197,6 +208,7 @@ def decode(
                 reference=_names(reference), settings=settings, as_json=as_json, plot=plot, explain=explain,
                 reading=reading, frame_rate_hz=frame_rate, speed=played, overlay=overlay_files(overlay, sheet),
                 report=None if report is None else requested(report, context.find_root().obj, inputs), force=force,
+                together=together, each_at=tuple(began) if together else (),
             )
         )  # fmt: skip
     raise typer.Exit(code)

@@ -10,15 +10,17 @@ from rich.console import Console
 from rich.progress import Progress
 
 from mtm_audit.commands.opened_key import KeySource, OpenedKey, opened_key
-from mtm_audit.commands.several import run_each
+from mtm_audit.commands.several import check_together, run_each
 from mtm_audit.decoding.decoding import Decoding
-from mtm_audit.decoding.recorded import decode_recording
+from mtm_audit.decoding.recorded import decode_recording, recorded_of
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.decoding.speeds import check_speed
+from mtm_audit.decoding.together import decode_together
 from mtm_audit.detectors import make_detector
 from mtm_audit.ingest.films import film_length
 from mtm_audit.ingest.recording import read_recording
-from mtm_audit.ingest.source import Source, sources_of
+from mtm_audit.ingest.source import Source, recordings_of, sources_of
+from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.recording import Recording
 from mtm_audit.model.stage import StageError, stage
 from mtm_audit.readers.logs.options import ReadOptions
@@ -43,7 +45,8 @@ class DecodeOptions:
     """What the command line asked for; `plot` None draws nothing, `reading` is how to read logs.
 
     `frame_rate_hz` replaces the times of films; `speed` is how many times as fast the recording is played, None to
-    search for it. `overlay` is what to draw over the film; `report` None writes no page.
+    search for it. `overlay` is what to draw over the film; `report` None writes no page. With `together` all recordings
+    show one message; `each_at` says when each was made, empty where the files do.
     """
 
     paths: tuple[Path, ...]
@@ -60,6 +63,8 @@ class DecodeOptions:
     report: ReportRequest | None = None
     force: bool = False
     overlay: OverlayFiles = field(default_factory=OverlayFiles)
+    together: bool = False
+    each_at: tuple[RecordedAt, ...] = ()
 
 
 def run_decode(options: DecodeOptions) -> int:
@@ -75,8 +80,14 @@ def run_decode(options: DecodeOptions) -> int:
         key = opened.key
         stages.append(Stage("key", (f"{key.id}, scheme {key.scheme.name} (fingerprint {key.scheme.fingerprint})",)))
         with stage("recording"):
-            sources = sources_of(options.paths)
+            sources = recordings_of(options.paths) if options.together else sources_of(options.paths)
             check_pictures(options.overlay, sources[0])
+    if options.together:
+        check_together(len(sources), len(options.each_at), options.settings.onset_s, options.speed)
+        with _explained(options, stages):
+            text, code = _told(options, opened, stages, *_decode_together(options, opened, sources, stages))
+        sys.stdout.write(text)
+        return code
     if len(sources) > 1:
         report = ("--report",) if options.report else ()
         single = (*(("--plot",) if options.plot else ()), *report, *options.overlay.options)
@@ -121,6 +132,12 @@ def _report(options: DecodeOptions, opened: OpenedKey, source: Source, stages: l
     """Decode one recording: what to print of it, and its exit code."""
     with _explained(options, stages):
         recording, decoding = _decode(options, opened, source, stages)
+    return _told(options, opened, stages, recording, decoding)
+
+
+def _told(
+    options: DecodeOptions, opened: OpenedKey, stages: list[Stage], recording: Recording, decoding: Decoding
+) -> tuple[str, int]:
     explanation = ""
     if options.explain:
         explanation = text_of_stages([*stages, *stages_of_decoding(decoding)]) + "\n"
@@ -135,28 +152,60 @@ def _decode(
     options: DecodeOptions, opened: OpenedKey, source: Source, stages: list[Stage]
 ) -> tuple[Recording, Decoding]:
     """Run the chain and tell each stage that is done; a refusal names the stage that could not go on."""
-    files, kind = source.files, source.kind
     with _progress() as progress:
-        with stage("recording"):
-            frames = film_length(files) if kind == "video" else None
-        if kind == "video":
-            stages.append(Stage("recording", (f"video {source.name}, {frames or 'an unknown number of'} frames",)))
-        task = progress.add_task(f"tracking {files[0].name}", total=frames, visible=kind == "video")
-        with stage("tracks" if kind == "video" else "recording"):
-            recording = read_recording(
-                files,
-                kind,
-                options.tracker,
-                lambda done: progress.update(task, completed=done),
-                options=options.reading,
-                frame_rate_hz=options.frame_rate_hz,
-                reference=options.reference,
-            )
-            recording = replace(recording, warnings=(*source.warnings, *recording.warnings))
-        progress.remove_task(task)
-        stages[1:] = stages_of_recording(recording)
-        opened.check_before_public(options.settings.at or recording.at)
+        recording = _recorded(options, opened, source, stages, progress)
         return _read(recording, opened.key, options, progress)
+
+
+def _decode_together(
+    options: DecodeOptions, opened: OpenedKey, sources: Sequence[Source], stages: list[Stage]
+) -> tuple[Recording, Decoding]:
+    """The chain for recordings of one message; the recording is the one that shows most."""
+    with _progress() as progress:
+        recordings = []
+        for number, source in enumerate(sources):
+            timed = options
+            if options.each_at:
+                timed = replace(options, settings=replace(options.settings, at=options.each_at[number]))
+            recordings.append((timed, _recorded(timed, opened, source, stages, progress)))
+        task = progress.add_task("reading", total=1.0)
+
+        def show(stage: str, fraction: float) -> None:
+            progress.update(task, description=stage, completed=fraction)
+
+        asked = [recorded_of(recording, timed.settings, timed.speed or 1.0) for timed, recording in recordings]
+        decoding, number = decode_together(asked, opened.key, show)
+    shown = recordings[number][1]
+    warnings = tuple(warning for _, recording in recordings for warning in recording.warnings)
+    names = tuple(source.name for source in sources)
+    return replace(shown, tracks=asked[number].tracks, warnings=warnings, together=names), decoding
+
+
+def _recorded(
+    options: DecodeOptions, opened: OpenedKey, source: Source, stages: list[Stage], progress: Progress
+) -> Recording:
+    """The recording behind a source, its tracks found."""
+    files, kind = source.files, source.kind
+    with stage("recording"):
+        frames = film_length(files) if kind == "video" else None
+    if kind == "video":
+        stages.append(Stage("recording", (f"video {source.name}, {frames or 'an unknown number of'} frames",)))
+    task = progress.add_task(f"tracking {files[0].name}", total=frames, visible=kind == "video")
+    with stage("tracks" if kind == "video" else "recording"):
+        recording = read_recording(
+            files,
+            kind,
+            options.tracker,
+            lambda done: progress.update(task, completed=done),
+            options=options.reading,
+            frame_rate_hz=options.frame_rate_hz,
+            reference=options.reference,
+        )
+        recording = replace(recording, warnings=(*source.warnings, *recording.warnings))
+    progress.remove_task(task)
+    stages[1:] = stages_of_recording(recording)
+    opened.check_before_public(options.settings.at or recording.at)
+    return recording
 
 
 def _read(recording: Recording, key: Key, options: DecodeOptions, progress: Progress) -> tuple[Recording, Decoding]:

@@ -7,9 +7,22 @@ from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.decoding.readings import Progress
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.decoding.speeds import at_speed, decode_at_speeds, played
+from mtm_audit.decoding.together import Recorded
 from mtm_audit.ingest.films import film_compression
 from mtm_audit.model.recording import Recording
 from mtm_onboard.protocol.key import Key
+
+
+def recorded_of(recording: Recording, settings: DecodeSettings, speed: float) -> Recorded:
+    """The recording, played at `speed`, for a decode together with others."""
+    timed = _timed(recording, settings)
+    return Recorded(played(recording.tracks, speed), at_speed(timed, recording.tracks, speed))
+
+
+def _timed(recording: Recording, settings: DecodeSettings) -> DecodeSettings:
+    """The settings with the time of the recording; what a person says of it comes before what the file says."""
+    given = settings.at
+    return replace(settings, at=recording.at if given is None else recording.begun_at(given))
 
 
 def decode_recording(
@@ -20,9 +33,7 @@ def decode_recording(
     A film that was not decoded comes with its compression, which is what may have kept the message from being read.
     Raises MtmError as `decode_tracks` does.
     """
-    given = settings.at
-    # What a person says of the recording's time comes before what the file says.
-    timed = replace(settings, at=recording.at if given is None else recording.begun_at(given))
+    timed = _timed(recording, settings)
     tracks = recording.tracks
     if speed is None:
         found, decoding = decode_at_speeds(tracks, key, timed, progress)

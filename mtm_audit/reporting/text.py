@@ -122,6 +122,17 @@ def piece_sentence(decoding: Decoding) -> str | None:
     return f"Read in pieces, since the recording is long; this is what {begin_s:.0f} s to {end_s:.0f} s show."
 
 
+def together_sentence(recording: Recording, decoding: Decoding) -> str | None:
+    """What each of several recordings says by itself; None for a single one."""
+    if not decoding.together:
+        return None
+    said = ", ".join(
+        f"{name} {each.evidence.bits:.1f} bits"
+        for name, each in zip(recording.together, decoding.together, strict=True)
+    )
+    return f"Recordings read together, by themselves: {said}. The channels are those of {recording.paths[0]}."
+
+
 def rarity(probability: float) -> str:
     """A probability as "43 in 100", "1 in 2,500" or "1 in 3e14"."""
     if probability >= 0.01:
@@ -140,6 +151,7 @@ def rests_on(recording: Recording, decoding: Decoding, basis: Basis = _NO_BASIS)
         search_sentence(recording, decoding),
         frame_sentence(decoding),
         piece_sentence(decoding),
+        together_sentence(recording, decoding),
     )
     return tuple(sentence for sentence in said if sentence)
 
