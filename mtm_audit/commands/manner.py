@@ -12,9 +12,16 @@ def version_option(program: str) -> Any:
 
     def tell(asked: bool) -> None:
         if asked:
-            from mtm_onboard.protocol.installing import program_version
-
-            print(f"{program} {program_version()}")
+            print(f"{program} {_version()}")
             raise typer.Exit
 
     return typer.Option("--version", callback=tell, is_eager=True, help="Print the version and exit.")
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("messages-through-motion")
+    except PackageNotFoundError:
+        return "(not installed, so without a version)"
