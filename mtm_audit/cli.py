@@ -260,6 +260,9 @@ def plan(
     measured_only: Annotated[
         bool, typer.Option("--measured-only", help="Search measured points alone, as the paper does.")
     ] = False,
+    sure: Annotated[
+        bool, typer.Option("--sure", help="Plan so that the interval's lower end meets the target.")
+    ] = False,
     check: Annotated[
         Path | None, typer.Option(metavar="TABLE.csv", help="Compare with accuracies of other recordings.")
     ] = None,
@@ -282,7 +285,7 @@ def plan(
         from mtm_audit.commands.plan import PlanOptions, run_plan
         from mtm_audit.planning.plan import Problem
 
-        problem = Problem(bits, accuracy, tuple(alphabet) if alphabet else None, measured_only)
+        problem = Problem(bits, accuracy, tuple(alphabet) if alphabet else None, measured_only, sure)
         chosen = None if strategy is None else strategy.value
         code = run_plan(PlanOptions(table, problem, rate, like, chosen, check, plot, out, force))
     raise typer.Exit(code)
