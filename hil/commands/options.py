@@ -86,4 +86,5 @@ def reported_console(command: str = "mtm-hil", *outputs: Path | None, force: boo
         from mtm_onboard.protocol.output_file import check_outputs
 
         check_outputs(command, *outputs, force=force)
-        yield Console()
+        # What users name may look like markup.
+        yield Console(markup=False)

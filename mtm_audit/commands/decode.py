@@ -7,10 +7,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress
 
 from mtm_audit.commands.opened_key import KeySource, OpenedKey, opened_key
 from mtm_audit.commands.several import run_each
+from mtm_audit.commands.unused import unused_options
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.decoding.settings import DecodeSettings
@@ -41,7 +43,7 @@ class DecodeOptions:
     """What the command line asked for; `plot` None draws nothing, `reading` is how to read logs.
 
     `frame_rate_hz` replaces the times of films; `speed` is how many times as fast the recording is played, None to
-    search for it.
+    search for it. `given` are the names of options that were given and may not matter, see `unused_options`.
     """
 
     paths: tuple[Path, ...]
@@ -56,6 +58,7 @@ class DecodeOptions:
     frame_rate_hz: float | None = None
     speed: float | None = 1.0
     force: bool = False
+    given: frozenset[str] = frozenset()
 
 
 def run_decode(options: DecodeOptions) -> int:
@@ -103,7 +106,9 @@ def _explained(options: DecodeOptions, stages: Sequence[Stage]) -> Iterator[None
         yield
     except StageError as error:
         if options.explain:
-            sys.stderr.write(text_of_stages([*stages, Stage(error.stage, (str(error),), failed=True)]))
+            sys.stderr.write(
+                text_of_stages([*stages, Stage(error.stage, (str(error),), failed=True, says_what_to_do=True)])
+            )
         raise
 
 
@@ -131,7 +136,7 @@ def _decode(
             frames = film_length(files) if kind == "video" else None
         if kind == "video":
             stages.append(Stage("recording", (f"video {source.name}, {frames or 'an unknown number of'} frames",)))
-        task = progress.add_task(f"tracking {files[0].name}", total=frames, visible=kind == "video")
+        task = progress.add_task(f"tracking {escape(files[0].name)}", total=frames, visible=kind == "video")
         with stage("tracks" if kind == "video" else "recording"):
             recording = read_recording(
                 files,
@@ -142,7 +147,8 @@ def _decode(
                 frame_rate_hz=options.frame_rate_hz,
                 reference=options.reference,
             )
-            recording = replace(recording, warnings=(*source.warnings, *recording.warnings))
+            unused = unused_options(options.given, kind, opened.key.scheme.schedule)
+            recording = replace(recording, warnings=(*source.warnings, *unused, *recording.warnings))
         progress.remove_task(task)
         stages[1:] = stages_of_recording(recording)
         opened.check_before_public(options.settings.at or recording.at)
@@ -191,7 +197,7 @@ def _publish(options: DecodeOptions, opened: OpenedKey, recording: Recording, de
     if options.as_json:
         return json_report(recording, decoding, warnings, basis)
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS)
+    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS, markup=False)
     with console.capture() as captured:
         print_report(console, recording, decoding, warnings, basis)
     return captured.get()
