@@ -60,6 +60,7 @@ def test_one_robot_or_ten_send_a_message(robots, capsys):
     assert (code, found["message"]) == (0, 178)
 
 
+@pytest.mark.long
 def test_a_key_is_made_for_text(capsys):
     assert record("--text", "gate 4", *QUICK) == 0
     code, found = decoded(capsys)
