@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -22,8 +22,9 @@ app = typer.Typer(
     no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, context_settings=HELP_OPTIONS,
 )  # fmt: skip
 
+_TRACKER = "aruco"
 _TRACKER_HELP = (
-    "How to find robots in a video: aruco or aruco:6x6_250, colour:NAME,..., centroid:COLOUR, brightness or "
+    "How to find robots in a video: aruco (default) or aruco:6x6_250, colour:NAME,..., centroid:COLOUR, brightness or "
     "brightness:X0,Y0,X1,Y1, arms:INNER,OUTER, football, or flow:X0,Y0,X1,Y1 (pixels from the upper left corner); "
     "see docs/filming.md."
 )
@@ -80,7 +81,7 @@ def decode(
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
-    tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
+    tracker: Annotated[str | None, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = None,
     reference: Annotated[
         str,
         typer.Option(
@@ -198,17 +199,22 @@ def decode(
             revoked=RevocationList() if revoked is None else load_revocations(revoked),
         )  # fmt: skip
         reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        given = _given({
+            "--tracker": tracker, "--reference": reference, "--frame-rate": frame_rate, "--topic": topic,
+            "--body": body, "--unit": unit, "--time-unit": time_unit, "--up": up, "--arrival-times": arrival_times,
+            "--at": at,
+        })  # fmt: skip
         played = None if search_speed else 1.0 if speed is None else speed
         inputs = {
             "key": key, "anchor": anchor, "disclosed key": disclosed, "profile": profile, "revocations": revoked,
         }  # fmt: skip
         code = run_decode(
             DecodeOptions(
-                paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker,
+                paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker or _TRACKER,
                 reference=_names(reference), settings=settings, as_json=as_json, plot=plot, explain=explain,
                 reading=reading, frame_rate_hz=frame_rate, speed=played, overlay=overlay_files(overlay, sheet),
                 report=None if report is None else requested(report, context.find_root().obj, inputs), force=force,
-                together=together, each_at=tuple(began) if together else (),
+                together=together, each_at=tuple(began) if together else (), given=given,
             )
         )  # fmt: skip
     raise typer.Exit(code)
@@ -312,7 +318,7 @@ def learn_profile(
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
-    tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
+    tracker: Annotated[str | None, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = None,
     reference: Annotated[
         str,
         typer.Option(
@@ -340,7 +346,15 @@ def learn_profile(
 
         settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
         reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
-        run_profile(ProfileOptions(tuple(paths), key, out, tracker, _names(reference), settings, reading, force))
+        given = _given({
+            "--tracker": tracker, "--reference": reference, "--topic": topic, "--body": body, "--unit": unit,
+            "--time-unit": time_unit, "--up": up, "--arrival-times": arrival_times,
+        })  # fmt: skip
+        run_profile(
+            ProfileOptions(
+                tuple(paths), key, out, tracker or _TRACKER, _names(reference), settings, reading, force, given
+            )
+        )
 
 
 @app.command("journal")
@@ -379,6 +393,9 @@ def plan(
     measured_only: Annotated[
         bool, typer.Option("--measured-only", help="Search measured points alone, as the paper does.")
     ] = False,
+    sure: Annotated[
+        bool, typer.Option("--sure", help="Plan so that the interval's lower end meets the target.")
+    ] = False,
     check: Annotated[
         Path | None, typer.Option(metavar="TABLE.csv", help="Compare with accuracies of other recordings.")
     ] = None,
@@ -401,7 +418,7 @@ def plan(
         from mtm_audit.commands.plan import PlanOptions, run_plan
         from mtm_audit.planning.plan import Problem
 
-        problem = Problem(bits, accuracy, tuple(alphabet) if alphabet else None, measured_only)
+        problem = Problem(bits, accuracy, tuple(alphabet) if alphabet else None, measured_only, sure)
         chosen = None if strategy is None else strategy.value
         code = run_plan(PlanOptions(table, problem, rate, like, chosen, check, plot, out, force))
     raise typer.Exit(code)
@@ -454,6 +471,11 @@ def _unix_s(text: str | None) -> float | None:
             f"{text!r} is no date and time; write it like 2026-01-31T12:00:00Z", param_hint="--at"
         ) from None
     return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()
+
+
+def _given(options: Mapping[str, object]) -> frozenset[str]:
+    """The names of those that were given, which are not None, empty or False."""
+    return frozenset(name for name, value in options.items() if value)
 
 
 def _names(text: str) -> tuple[str, ...]:

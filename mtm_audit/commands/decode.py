@@ -46,7 +46,8 @@ class DecodeOptions:
 
     `frame_rate_hz` replaces the times of films; `speed` is how many times as fast the recording is played, None to
     search for it. `overlay` is what to draw over the film; `report` None writes no page. With `together` all recordings
-    show one message; `each_at` says when each was made, empty where the files do.
+    show one message; `each_at` says when each was made, empty where the files do. `given` are the names of options that
+    were given and may not matter, see `unused_options`.
     """
 
     paths: tuple[Path, ...]
@@ -65,6 +66,7 @@ class DecodeOptions:
     overlay: OverlayFiles = field(default_factory=OverlayFiles)
     together: bool = False
     each_at: tuple[RecordedAt, ...] = ()
+    given: frozenset[str] = frozenset()
 
 
 def run_decode(options: DecodeOptions) -> int:
@@ -124,7 +126,9 @@ def _explained(options: DecodeOptions, stages: Sequence[Stage]) -> Iterator[None
         yield
     except StageError as error:
         if options.explain:
-            sys.stderr.write(text_of_stages([*stages, Stage(error.stage, (str(error),), failed=True)]))
+            sys.stderr.write(
+                text_of_stages([*stages, Stage(error.stage, (str(error),), failed=True, says_what_to_do=True)])
+            )
         raise
 
 

@@ -124,7 +124,7 @@ def test_a_missing_robot_is_named_with_what_would_help(audit, folder):
     code, out, _ = audit(folder / "sent/robot0.tum", *QUICK)
     assert code == 4
     assert out.startswith("inconclusive:")
-    assert "not seen: symbol 1, which robot1 sends" in out
+    assert "not seen: symbol 1, the part of robot1" in out
     assert "warning: no track shows robot1" in out
 
 
