@@ -1,5 +1,6 @@
 """What a picture or a report is about: recording, key and dates in one line."""
 
+import time
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -35,7 +36,7 @@ def dated(when: datetime) -> str:
 
 def now() -> datetime:
     """The present moment with the machine's zone."""
-    return datetime.now().astimezone()
+    return datetime.fromtimestamp(time.time(), UTC).astimezone()
 
 
 def _utc(at: RecordedAt) -> str:
