@@ -17,7 +17,7 @@ def subject_line(recording: Recording, decoding: Decoding, drawn: datetime) -> s
         [
             f"recording {files_named(recording.paths)}",
             f"key {decoding.key_id} (scheme {decoding.scheme.name}, {decoding.scheme.fingerprint})",
-            f"recorded {_utc(at)}" if at is not None else "recorded at an unknown time",
+            f"recorded {_begun(at, recording)}" if at is not None else "recorded at an unknown time",
             f"drawn {dated(drawn)}",
         ]
     )
@@ -39,5 +39,7 @@ def now() -> datetime:
     return datetime.fromtimestamp(time.time(), UTC).astimezone()
 
 
-def _utc(at: RecordedAt) -> str:
-    return f"{datetime.fromtimestamp(at.unix_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
+def _begun(at: RecordedAt, recording: Recording) -> str:
+    """When the first observation was made; `at` is when the recording's own clock stood at zero."""
+    first_s = min(float(track.times_s[0]) for track in recording.tracks)
+    return f"{datetime.fromtimestamp(at.unix_s + first_s, UTC):%Y-%m-%d %H:%M:%S} UTC"

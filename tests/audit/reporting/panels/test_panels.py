@@ -92,8 +92,7 @@ def test_an_exchanged_robot_s_bar_says_where_it_is(axes):
 @pytest.mark.parametrize(("made", "certain"), [(both_sent, [(3, 0), (1, 1)]), (one_silent, [(3, 0)])])
 def test_only_certain_symbols_are_framed(axes, made, certain):
     draw_scores(axes, made()[1])
-    (framed,) = axes.lines
-    assert list(zip(*framed.get_data(), strict=True)) == certain
+    assert [tuple(np.round(frame.get_center())) for frame in axes.patches] == certain
 
 
 def test_what_is_not_certain_has_no_lead(axes):
