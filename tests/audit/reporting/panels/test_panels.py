@@ -173,6 +173,11 @@ def test_tracks_over_a_picture_fill_exactly_it(axes):
     assert [text.get_text() for text in axes.texts] == ["marker0"]
 
 
+def test_pixels_of_a_picture_of_unknown_height_say_so(axes):
+    draw_tracks(axes, (pixels(),))
+    assert axes.get_ylabel() == "y [px, upwards from the lowest row]"
+
+
 def test_tracks_in_metres_point_up(axes):
     draw_tracks(axes, both_sent()[0].tracks)
     assert not axes.yaxis_inverted()
