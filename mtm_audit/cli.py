@@ -1,7 +1,4 @@
-"""The command line: `mtm-audit <command>`.
-
-Exit codes of `decode`: 0 decoded, 3 absent, 4 inconclusive, 1 error, 2 usage, 130 interrupted.
-"""
+"""The command line: `mtm-audit <command>`. Exit codes: docs/command-line.md."""
 
 import math
 import os
@@ -14,18 +11,20 @@ import typer
 
 from mtm_audit.commands.errors import reported
 from mtm_audit.commands.force import Force
+from mtm_audit.commands.manner import HELP_OPTIONS, version_option
 
 if TYPE_CHECKING:
     from mtm_audit.readers.logs.options import ReadOptions
 
 app = typer.Typer(
     help="Find out what a robot said with its motion: from a recording and a key to a verdict.",
-    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+    no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, context_settings=HELP_OPTIONS,
 )  # fmt: skip
 
 _TRACKER_HELP = (
-    "How to find robots in a video: aruco or aruco:6x6_250, colour:NAME,..., brightness:X0,Y0,X1,Y1, "
-    "arms:INNER,OUTER, football or flow:X0,Y0,X1,Y1 (pixels from the upper left corner)."
+    "How to find robots in a video: aruco or aruco:6x6_250, colour:NAME,..., centroid:COLOUR, brightness or "
+    "brightness:X0,Y0,X1,Y1, arms:INNER,OUTER, football, or flow:X0,Y0,X1,Y1 (pixels from the upper left corner); "
+    "see docs/filming.md."
 )
 
 
@@ -54,19 +53,9 @@ class StrategyName(StrEnum):
     SPLIT = "split"
 
 
-def _version(asked: bool) -> None:
-    if asked:
-        from importlib.metadata import version
-
-        print(f"mtm-audit {version('messages-through-motion')}")
-        raise typer.Exit
-
-
 @app.callback()
 def _every_command(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
+    version: Annotated[bool, version_option("mtm-audit")] = False,
 ) -> None:
     pass
 
@@ -117,11 +106,15 @@ def decode(
     decoys: Annotated[
         int | None,
         typer.Option(
-            min=8, max=10_000, help="Keys that nobody holds, to compare with: 40 for coherency, none for matched."
+            metavar="N",
+            min=8,
+            max=10_000,
+            help="Keys that nobody holds, to compare with: 40 for coherency, none for matched.",
         ),
     ] = None,
     threshold: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="How often a message that is called decoded may be wrong.")
+        float,
+        typer.Option(metavar="P", min=1e-12, max=1.0, help="How often a message that is called decoded may be wrong."),
     ] = 1e-4,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON (docs/decode-json.md) instead of a table.")
@@ -379,11 +372,13 @@ def _reading(
     arrival_times: bool,
 ) -> "ReadOptions":
     from mtm_audit.readers.logs.options import ReadOptions, marker_groups
+    from mtm_onboard.protocol.errors import command_line_values
 
-    return ReadOptions(
-        unit=unit, time_unit=time_unit, up=up, topics=tuple(topics or ()), bodies=marker_groups(bodies or ()),
-        arrival_times=arrival_times,
-    )  # fmt: skip
+    with command_line_values():
+        return ReadOptions(
+            unit=unit, time_unit=time_unit, up=up, topics=tuple(topics or ()), bodies=marker_groups(bodies or ()),
+            arrival_times=arrival_times,
+        )  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -7,14 +7,18 @@ import typer
 from hil.commands.options import CELLS_FOLDER, Cells, FirstSeed, OutCsv, Workers, reported_console
 from mtm_audit.commands.force import Force
 
-codecs = typer.Typer(help="Measure what encoders leave of a message in a film.", no_args_is_help=True)
+codecs = typer.Typer(
+    help="Measure what encoders leave of a message in a film.", no_args_is_help=True, rich_markup_mode=None
+)
 
 _FIRST_SEED = 900_000
 
 
 @codecs.command("evidence")
 def _evidence(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts of each loudness and size of picture.")] = 1,
+    rollouts: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Rollouts of each loudness and size of picture.")
+    ] = 1,
     seed: FirstSeed = _FIRST_SEED,
     workers: Workers = None,
     out: OutCsv = None,
@@ -30,7 +34,7 @@ def _evidence(
 
 @codecs.command("motion")
 def _motion(
-    films: Annotated[int, typer.Option("-n", min=1, help="Films of each size of motion.")] = 3,
+    films: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Films of each size of motion.")] = 3,
     seed: FirstSeed = _FIRST_SEED,
     workers: Workers = None,
     out: OutCsv = None,

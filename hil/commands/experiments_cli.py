@@ -19,8 +19,10 @@ class FrameName(StrEnum):
 
 
 def calibrate(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each slip and window length.")] = 20,
-    out: Annotated[Path | None, typer.Option(help="A plant's file to write as well.")] = None,
+    rollouts: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Rollouts for each slip and window length.")
+    ] = 20,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="A plant's file to write as well.")] = None,
     force: Force = False,
     cells: Cells = CELLS_FOLDER / "calibrate.jsonl",
 ) -> None:
@@ -33,7 +35,9 @@ def calibrate(
 
 def bench(
     *,
-    rollouts: Annotated[int, typer.Option(min=1, help="Rollouts of the main conditions; slow ones take fewer.")] = 200,
+    rollouts: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Rollouts of the main conditions; slow ones take fewer.")
+    ] = 200,
     quick: Annotated[
         bool, typer.Option("--quick", help="A few rollouts of some conditions, for a first look.")
     ] = False,
@@ -41,10 +45,12 @@ def bench(
         str | None,
         typer.Option(metavar="NAMES", help="Other robots instead: all, or names and plant files parted by commas."),
     ] = None,
-    ticks: Annotated[int, typer.Option(min=10, help="With --plants: window of a symbol.")] = 100,
+    ticks: Annotated[int, typer.Option(metavar="TICKS", min=10, help="With --plants: window of a symbol.")] = 100,
     out: OutCsv = None,
     force: Force = False,
-    plot: Annotated[Path | None, typer.Option(help="A picture to draw: accuracy over the window length.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="A picture to draw: accuracy over the window length.")
+    ] = None,
     cells: Cells = CELLS_FOLDER / "bench.jsonl",
 ) -> None:
     """Compare the paper's detector and ours with the genie, an oracle, on the same recordings."""
@@ -67,8 +73,10 @@ def bench(
 
 def false_alarms(
     *,
-    decodes: Annotated[int, typer.Option("-n", min=4, help="Decodes with a wrong key, and as many without.")] = 3000,
-    detector: Annotated[str, typer.Option(help="Which detector decodes.")] = "matched",
+    decodes: Annotated[
+        int, typer.Option("-n", metavar="N", min=4, help="Decodes with a wrong key, and as many without.")
+    ] = 3000,
+    detector: Annotated[str, typer.Option(metavar="NAME", help="Which detector decodes.")] = "matched",
     seed: FirstSeed = 500_000,
     workers: Workers = None,
     out: OutCsv = None,
@@ -83,7 +91,9 @@ def false_alarms(
 
 
 def messages(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Messages of the first kind; fewer of the others.")] = 200,
+    rollouts: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Messages of the first kind; fewer of the others.")
+    ] = 200,
     seed: FirstSeed = 700_000,
     workers: Workers = None,
     out: OutCsv = None,
@@ -98,7 +108,7 @@ def messages(
 
 
 def cameras(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Runs that each camera films.")] = 2,
+    rollouts: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Runs that each camera films.")] = 2,
     seed: CellSeed = 900_000,
     workers: Workers = None,
     out: OutCsv = None,
@@ -113,7 +123,7 @@ def cameras(
 
 
 def frames(
-    count: Annotated[int, typer.Option("-n", min=200, help="Frames under noise for each check.")] = 10_000,
+    count: Annotated[int, typer.Option("-n", metavar="N", min=200, help="Frames under noise for each check.")] = 10_000,
     seed: CellSeed = 0,
     workers: Workers = None,
     out: OutCsv = None,
@@ -128,7 +138,9 @@ def frames(
 
 
 def shim(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts, each run with Python and with the shim.")] = 100,
+    rollouts: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Rollouts, each run with Python and with the shim.")
+    ] = 100,
     out: OutCsv = None,
     force: Force = False,
     cells: Cells = CELLS_FOLDER / "shim.jsonl",
@@ -141,7 +153,7 @@ def shim(
 
 
 def robustness(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts under each condition.")] = 100,
+    rollouts: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Rollouts under each condition.")] = 100,
     seed: FirstSeed = 600_000,
     workers: Workers = None,
     out: OutCsv = None,
@@ -161,9 +173,9 @@ def sweep(
         typer.Argument(metavar="WORLD", help="The world: robomaster, discovery, lunar-lander, reacher or football."),
     ],
     *,
-    out: Annotated[Path, typer.Option(help="The accuracy table to write, for mtm-audit plan.")],
+    out: Annotated[Path, typer.Option(metavar="FILE.csv", help="The accuracy table to write, for mtm-audit plan.")],
     force: Force = False,
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each M and window.")] = 50,
+    rollouts: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Rollouts for each M and window.")] = 50,
     alphabet: Annotated[
         list[int] | None, typer.Option(metavar="M", help="Alphabet size; may be repeated (default: 4, 16, 64).")
     ] = None,
@@ -171,12 +183,18 @@ def sweep(
         list[int] | None,
         typer.Option(metavar="TICKS", min=1, help="Window; may be repeated (default: 30, 45, 60, 80, 110, 150)."),
     ] = None,
-    windows: Annotated[int, typer.Option(min=1, help="Windows in a row, about as many as a message will have.")] = 2,
+    windows: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Windows in a row, about as many as a message will have.")
+    ] = 2,
     scheme: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Measure this scheme's own windows, and whole messages.")
     ] = None,
-    detector: Annotated[str, typer.Option(help="Which detector decodes: matched or coherency.")] = "matched",
-    first_seed: FirstSeed = 700_000,
+    detector: Annotated[
+        str, typer.Option(metavar="NAME", help="Which detector decodes: matched or coherency.")
+    ] = "matched",
+    seed: Annotated[
+        int, typer.Option("--seed", "--first-seed", metavar="N", min=0, help="The first rollout's seed.")
+    ] = 700_000,
     workers: Workers = None,
     cells: Cells = CELLS_FOLDER / "sweep.jsonl",
 ) -> None:
@@ -193,7 +211,7 @@ def sweep(
             windows=windows,
             scheme=scheme,
             detector=detector,
-            first_seed=first_seed,
+            first_seed=seed,
             workers=workers,
             out=out,
             cells=cells,
@@ -202,20 +220,29 @@ def sweep(
 
 
 def real(
-    folder: Annotated[Path, typer.Argument(help="Recorded trajectories without a message: TUM or CSV files.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Recorded trajectories without a message: TUM or CSV files.")
+    ],
     *,
-    messages: Annotated[int, typer.Option("-n", min=1, help="Messages on each recording, frame and sigma.")] = 2,
+    messages: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Messages on each recording, frame and sigma.")
+    ] = 2,
     frame: Annotated[
         list[FrameName] | None, typer.Option(help="Where the noise lives; may be repeated (default: both).")
     ] = None,
     sigma: Annotated[
-        list[float] | None, typer.Option(min=1e-4, max=10.0, help="Noise in m/s; may be repeated (default: 0.1).")
+        list[float] | None,
+        typer.Option(metavar="MPS", min=1e-4, max=10.0, help="Noise in m/s; may be repeated (default: 0.1)."),
     ] = None,
     alphabet: Annotated[int, typer.Option(metavar="M", min=2, help="Alphabet size.")] = 8,
     window: Annotated[float, typer.Option(metavar="SECONDS", min=0.1, help="Length of a symbol.")] = 4.0,
-    seconds: Annotated[float, typer.Option(min=1.0, help="Length of the piece of each recording.")] = 48.0,
+    seconds: Annotated[
+        float, typer.Option(metavar="SECONDS", min=1.0, help="Length of the piece of each recording.")
+    ] = 48.0,
     band: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Band of the noise in Hz.")] = "0.5:4",
-    threshold: Annotated[float, typer.Option(min=1e-12, max=1.0, help="How often a verdict may be wrong.")] = 1e-4,
+    threshold: Annotated[
+        float, typer.Option(metavar="P", min=1e-12, max=1.0, help="How often a verdict may be wrong.")
+    ] = 1e-4,
     onset_known: Annotated[bool, typer.Option("--onset-known", help="Tell the decode when the message began.")] = False,
     seed: FirstSeed = 800_000,
     workers: Workers = None,
@@ -256,10 +283,16 @@ def identify(
     offset: Annotated[
         float, typer.Option(metavar="SECONDS", help="Added to the commands' times, such as when a journal begins.")
     ] = 0.0,
-    plant: Annotated[Path | None, typer.Option(help="A plant file to write, for bench --plants and record.")] = None,
-    profile: Annotated[Path | None, typer.Option(help="A profile to write, for mtm-audit decode.")] = None,
-    summary: Annotated[str, typer.Option(help="What kind of robot it is, for the plant file.")] = "identified",
-    source: Annotated[str, typer.Option(help="Where the logs come from, for the plant file.")] = "",
+    plant: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help="A plant file to write, for bench --plants and record.")
+    ] = None,
+    profile: Annotated[
+        Path | None, typer.Option(metavar="FILE.profile", help="A profile to write, for mtm-audit decode.")
+    ] = None,
+    summary: Annotated[
+        str, typer.Option(metavar="TEXT", help="What kind of robot it is, for the plant file.")
+    ] = "identified",
+    source: Annotated[str, typer.Option(metavar="TEXT", help="Where the logs come from, for the plant file.")] = "",
     out: OutCsv = None,
     force: Force = False,
 ) -> None:
@@ -281,8 +314,10 @@ def identify(
 
 
 def faults(
-    seeds: Annotated[int, typer.Option("-n", min=1, help="Runs of each combination of wire, fault and loss.")] = 3,
-    seed: Annotated[int, typer.Option(min=0, help="The first run's seed.")] = 0,
+    seeds: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Runs of each combination of wire, fault and loss.")
+    ] = 3,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="The first run's seed.")] = 0,
     workers: Workers = None,
     out: OutCsv = None,
     force: Force = False,
@@ -297,7 +332,9 @@ def faults(
 
 
 def fuzz(
-    inputs: Annotated[int, typer.Option("-n", min=1, help="Inputs, over all ends of all wires.")] = 1_000_000,
+    inputs: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Inputs, over all ends of all wires.")
+    ] = 1_000_000,
     seed: CellSeed = 0,
     workers: Workers = None,
     out: OutCsv = None,
@@ -313,7 +350,7 @@ def fuzz(
 
 
 def forgeries(
-    tries: Annotated[int, typer.Option("-n", min=1, help="Tries, over all attacks.")] = 10_000,
+    tries: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Tries, over all attacks.")] = 10_000,
     seed: CellSeed = 0,
     workers: Workers = None,
     out: OutCsv = None,
@@ -332,9 +369,13 @@ def forgeries(
 
 
 def endurance(
-    hours: Annotated[float, typer.Option(min=0.0, help="Simulated hours.")] = 24.0,
-    checkpoints: Annotated[int, typer.Option(min=1, help="Number of checkpoints, evenly spaced up to the end.")] = 24,
-    seed: Annotated[int, typer.Option(min=0, help="Decides where the robot goes and how its wheels slip.")] = 0,
+    hours: Annotated[float, typer.Option(metavar="HOURS", min=0.0, help="Simulated hours.")] = 24.0,
+    checkpoints: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Number of checkpoints, evenly spaced up to the end.")
+    ] = 24,
+    seed: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Decides where the robot goes and how its wheels slip.")
+    ] = 0,
     out: OutCsv = None,
     force: Force = False,
 ) -> None:

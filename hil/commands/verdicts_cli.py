@@ -7,7 +7,7 @@ import typer
 from hil.commands.options import CELLS_FOLDER, Cells, FirstSeed, OutCsv, Workers, reported_console
 from mtm_audit.commands.force import Force
 
-verdicts = typer.Typer(help="Measure what a verdict is worth.", no_args_is_help=True)
+verdicts = typer.Typer(help="Measure what a verdict is worth.", no_args_is_help=True, rich_markup_mode=None)
 
 _FIRST_SEED = 700_000
 
@@ -15,7 +15,9 @@ _FIRST_SEED = 700_000
 @verdicts.command("validity")
 def _validity(
     *,
-    keys: Annotated[int, typer.Option("-n", min=1, help="Keys on each of ten recordings of every kind.")] = 2000,
+    keys: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Keys on each of ten recordings of every kind.")
+    ] = 2000,
     only: Annotated[list[str] | None, typer.Option(metavar="KIND", help="This kind alone; may be repeated.")] = None,
     seed: FirstSeed = _FIRST_SEED,
     workers: Workers = None,
@@ -34,7 +36,7 @@ def _validity(
 @verdicts.command("sure")
 def _sure(
     *,
-    messages: Annotated[int, typer.Option("-n", min=1, help="Messages on each vehicle.")] = 500,
+    messages: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Messages on each vehicle.")] = 500,
     only: Annotated[list[str] | None, typer.Option(metavar="PLANT", help="This one alone; may be repeated.")] = None,
     seed: FirstSeed = _FIRST_SEED,
     workers: Workers = None,
@@ -52,7 +54,9 @@ def _sure(
 
 @verdicts.command("power")
 def _power(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts of each condition and message length.")] = 60,
+    rollouts: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Rollouts of each condition and message length.")
+    ] = 60,
     seed: FirstSeed = _FIRST_SEED,
     workers: Workers = None,
     out: OutCsv = None,

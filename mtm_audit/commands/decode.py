@@ -22,13 +22,14 @@ from mtm_audit.ingest.source import Source, sources_of
 from mtm_audit.model.recording import Recording
 from mtm_audit.model.stage import StageError, stage
 from mtm_audit.readers.logs.options import ReadOptions
+from mtm_audit.readers.video.clock import EvenClock
 from mtm_audit.reporting.json_report import json_report
 from mtm_audit.reporting.remarks import remarks
 from mtm_audit.reporting.report.provenance import ReportRequest
 from mtm_audit.reporting.stages import Stage, stages_of_decoding, stages_of_recording, text_of_stages
 from mtm_audit.reporting.text import print_report
 from mtm_audit.tracking.registry import tracker
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import MtmError, command_line_values
 from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.output_file import check_outputs
 
@@ -87,8 +88,11 @@ def run_decode(options: DecodeOptions) -> int:
 def _check(options: DecodeOptions) -> None:
     """Refuse what would fail after the long work."""
     make_detector(options.settings.detector, options.settings.profile)
-    tracker(options.tracker)
-    check_speed(1.0 if options.speed is None else options.speed)
+    with command_line_values():
+        tracker(options.tracker)
+        check_speed(1.0 if options.speed is None else options.speed)
+        if options.frame_rate_hz is not None:
+            EvenClock(options.frame_rate_hz)
     page = None if options.report is None else options.report.path
     check_outputs("mtm-audit decode", options.plot, page, force=options.force)
     if options.plot is not None:

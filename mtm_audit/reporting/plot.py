@@ -18,7 +18,7 @@ from mtm_audit.reporting.panels.tracks import draw_tracks
 from mtm_audit.reporting.still import still_of
 from mtm_audit.reporting.subject import now, subject_line
 from mtm_audit.reporting.text import chance_sentence, verdict_sentence
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import MtmError, WrongValueError
 
 SUFFIXES = (".png", ".pdf", ".svg")
 
@@ -26,7 +26,7 @@ SUFFIXES = (".png", ".pdf", ".svg")
 def check_plot_path(path: Path) -> None:
     """Raise MtmError unless a picture can be written to `path`; meant for the time before the long work."""
     if path.suffix.lower() not in SUFFIXES:
-        raise MtmError(f"{path} is no picture format that can be drawn; end the name in {', '.join(SUFFIXES)}")
+        raise WrongValueError(f"{path} is no picture format that can be drawn; end the name in {', '.join(SUFFIXES)}")
     if path.is_dir():
         raise MtmError(f"{path} is a folder; name a file for the picture")
     try:

@@ -74,7 +74,7 @@ def output_file(
 def _check(path: Path, command: str, force: bool, begins: tuple[bytes, ...]) -> None:
     folder = path.parent
     if not folder.is_dir():
-        raise MtmError(f"cannot write {path}: there is no folder {folder}; make it first, or name another")
+        raise MtmError(f"cannot write {path}: there is no folder {folder}; choose a folder that exists")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise MtmError(f"cannot write {path}: the folder {folder} is not yours to write; choose another")
     if not os.path.lexists(path):

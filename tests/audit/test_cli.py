@@ -67,10 +67,10 @@ def audit(folder, capsys):
     return run
 
 
-def refused(answer, words):
-    """One sentence on standard error, nothing on standard output, exit code 1."""
-    code, out, err = answer
-    assert (code, out) == (1, "")
+def refused(answer, words, code=1):
+    """One sentence on standard error, nothing on standard output, and the exit code."""
+    assert answer[:2] == (code, "")
+    err = answer[2]
     assert err.startswith("mtm-audit: ")
     assert err.count("\n") == 1
     assert words in err
@@ -227,7 +227,7 @@ def test_a_decode_is_drawn(audit, folder, tmp_path, name, code):
 
 def test_an_unwritable_picture_is_refused_before_the_work(audit, folder, tmp_path, monkeypatch):
     monkeypatch.setattr("mtm_audit.commands.decode.decode_tracks", lambda *_: pytest.fail("worked first"))
-    refused(audit(folder / "sent", "--plot", tmp_path / "decode.bmp"), "end the name in .png, .pdf, .svg")
+    refused(audit(folder / "sent", "--plot", tmp_path / "decode.bmp"), "end the name in .png, .pdf, .svg", code=2)
     refused(audit(folder / "sent", "--plot", tmp_path / "nowhere/decode.png"), "there is no folder")
     (tmp_path / "folder.png").mkdir()
     refused(audit(folder / "sent", "--plot", tmp_path / "folder.png"), "is a folder")
@@ -238,12 +238,13 @@ def test_a_drawing_that_breaks_off_leaves_the_former_picture(audit, folder, tmp_
         raise KeyboardInterrupt
 
     picture = tmp_path / "decode.png"
-    picture.write_bytes(PNG + b"\x1a\nmade by mtm-audit decode: the former one")
-    former = picture.read_bytes()
+    picture.write_bytes(PNG + b"\x1a\n made by mtm-audit decode")
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", interrupted)
     code, out, _ = audit(folder / "sent", *QUICK, "--plot", picture, "--json")
     assert (code, out) == (130, "")
-    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("decode.png", former)]
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [
+        ("decode.png", PNG + b"\x1a\n made by mtm-audit decode")
+    ]
 
 
 def test_an_interrupt_ends_with_130_and_no_answer(audit, folder, monkeypatch):
@@ -338,8 +339,8 @@ def test_a_truncated_video_is_refused(audit, video):
 
 
 def test_names_that_do_not_exist_are_refused_with_those_that_do(audit, folder):
-    refused(audit(folder / "sent", "--tracker", "eyes"), "choose one of: aruco")
-    refused(audit(folder / "sent", detector="guessing"), "choose one of: coherency")
+    refused(audit(folder / "sent", "--tracker", "eyes"), "choose one of: aruco", code=2)
+    refused(audit(folder / "sent", detector="guessing"), "choose one of: coherency", code=2)
     refused(audit(folder / "sent", "--assign", "arm=robot0"), "its bodies are: robot0, robot1")
 
 
@@ -450,7 +451,7 @@ def test_options_of_logs_reach_the_reader(audit, tmp_path):
     ],
 )
 def test_options_of_logs_that_mean_nothing_are_refused(audit, folder, option, value, words):
-    refused(audit(folder / "sent", option, value), words)
+    refused(audit(folder / "sent", option, value), words, code=2)
 
 
 def test_a_topic_is_chosen_on_the_command_line(audit, tmp_path):
@@ -502,7 +503,7 @@ def test_a_report_never_takes_the_place_of_a_key(audit, folder, tmp_path):
 
 def test_a_report_is_refused_before_the_work(audit, folder, tmp_path, monkeypatch):
     monkeypatch.setattr("mtm_audit.commands.decode.decode_tracks", lambda *_: pytest.fail("worked first"))
-    refused(audit(folder / "sent", "--report", tmp_path / "report.txt"), "end it in .html or .htm")
+    refused(audit(folder / "sent", "--report", tmp_path / "report.txt"), "end it in .html or .htm", code=2)
     refused(audit(folder / "sent", "--report", tmp_path / "nowhere/report.html"), "there is no folder")
     refused(audit(folder / "sent", "--report", tmp_path / "a.html", "--plot", tmp_path / "a.html"), "for two results")
 
