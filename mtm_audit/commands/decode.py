@@ -194,7 +194,7 @@ def _recorded(
         frames = film_length(files) if kind == "video" else None
     if kind == "video":
         stages.append(Stage("recording", (f"video {source.name}, {frames or 'an unknown number of'} frames",)))
-    task = progress.add_task(f"tracking {files[0].name}", total=frames, visible=kind == "video")
+    task = progress.add_task(f"tracking {escape(files[0].name)}", total=frames, visible=kind == "video")
     with stage("tracks" if kind == "video" else "recording"):
         recording = read_recording(
             files,
@@ -205,7 +205,8 @@ def _recorded(
             frame_rate_hz=options.frame_rate_hz,
             reference=options.reference,
         )
-        recording = replace(recording, warnings=(*source.warnings, *recording.warnings))
+        unused = unused_options(options.given, kind, opened.key.scheme.schedule)
+        recording = replace(recording, warnings=(*source.warnings, *unused, *recording.warnings))
     progress.remove_task(task)
     stages[1:] = stages_of_recording(recording)
     opened.check_before_public(options.settings.at or recording.at)

@@ -13,24 +13,14 @@ def version_option(program: str) -> Any:
 
     def tell(asked: bool) -> None:
         if asked:
-<<<<<<< HEAD
             print(f"{program} {_installed_version()}")
-=======
-            print(f"{program} {_version()}")
->>>>>>> s22-manner
             raise typer.Exit
 
     return typer.Option("--version", callback=tell, is_eager=True, help="Print the version and exit.")
 
 
-<<<<<<< HEAD
 def _installed_version() -> str:
     """As `mtm_onboard.protocol.installing.program_version`, without numpy, which comes with all of the protocol."""
-=======
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
->>>>>>> s22-manner
     try:
         return version("messages-through-motion")
     except PackageNotFoundError:

@@ -502,7 +502,7 @@ def test_a_report_never_takes_the_place_of_a_key(audit, folder, tmp_path):
 
 def test_a_report_is_refused_before_the_work(audit, folder, tmp_path, monkeypatch):
     monkeypatch.setattr("mtm_audit.decoding.recorded.decode_tracks", lambda *_: pytest.fail("worked first"))
-    refused(audit(folder / "sent", "--report", tmp_path / "report.txt"), "end it in .html or .htm")
+    refused(audit(folder / "sent", "--report", tmp_path / "report.txt"), "end it in .html or .htm", code=2)
     refused(audit(folder / "sent", "--report", tmp_path / "nowhere/report.html"), "there is no folder")
     refused(audit(folder / "sent", "--report", tmp_path / "a.html", "--plot", tmp_path / "a.html"), "for two results")
 
