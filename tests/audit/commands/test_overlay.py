@@ -13,8 +13,8 @@ from mtm_onboard.protocol import save_key
 from tests.audit.moving_robot import key_of, robot_track, scheme_of
 from tests.audit.small_films import film, marker
 
-SIZE, SECONDS = (480, 360), 6.0
-KEY = key_of(scheme_of(symbols=(1, 1), ticks=200))
+SIZE, SECONDS = (480, 360), 4.0
+KEY = key_of(scheme_of(symbols=(1, 1), ticks=100))
 TRACKS = [
     robot_track(KEY, f"robot{number}", (symbol,), SECONDS, onset_s=0.5, seed=number, rate_hz=30.0)
     for number, symbol in enumerate((3, 1))
