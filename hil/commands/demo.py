@@ -18,7 +18,7 @@ from mtm_onboard.protocol import MtmError
 
 MESSAGE = 0b10110010
 SECONDS = 15
-PLOT = "decode.png"
+PLOT, STILL = "decode.png", "overlay.png"
 _AT_ONCE = 2
 _VERDICT_CODES = (0, 3, 4)
 
@@ -38,7 +38,7 @@ _RECORDINGS = (
     f"mtm-hil record --out silent --no-message --no-video --key robot.key --seconds {SECONDS} --seed 1",
 )
 _CHECKS = (
-    _Check("video", f"message/video.mp4 --key robot.key --plot {PLOT}", MESSAGE),
+    _Check("video", f"message/video.mp4 --key robot.key --plot {PLOT} --overlay {STILL}", MESSAGE),
     _Check("motion capture", "message/mocap --key robot.key", MESSAGE),
     _Check("another key", "message/mocap --key other.key", None),
     _Check("no message sent", "silent/mocap --key robot.key", None),
@@ -60,7 +60,7 @@ def demo(out: Path, console: Console) -> bool:
         answers = _decode_all(folder)
     good = [_is_expected(check, answer) for check, answer in zip(_CHECKS, answers, strict=True)]
     console.print(_table(answers, good))
-    print(f"the decode of the video is drawn in {out / PLOT}")
+    print(f"the decode of the video is drawn in {out / PLOT}, and what was seen in it over a picture in {out / STILL}")
     return all(good)
 
 

@@ -113,7 +113,8 @@ def _text(lines: list[Line], commands: tuple[str, ...], warnings: tuple[str, ...
     said = [f"{head:<{_HEAD}}{line}" for head, line in lines]
     said += [f"{'try' if number == 0 else '':<{_HEAD}}{command}" for number, command in enumerate(commands)]
     said += [f"warning: {warning}" for warning in warnings]
-    return "\n".join(said) + "\n"
+    # Names come from outside, and must not command a terminal.
+    return "\n".join("".join(letter if letter.isprintable() else "?" for letter in line) for line in said) + "\n"
 
 
 def _progress() -> Progress:

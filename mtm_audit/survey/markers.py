@@ -7,10 +7,23 @@ import cv2
 import numpy as np
 
 from mtm_audit.model.picture import Frame, Image
+from mtm_audit.model.spread import spread_evenly
 from mtm_audit.model.track import Floats
-from mtm_audit.tracking.dictionaries import FAMILIES, USUAL, exact_readings, size_for
+from mtm_audit.tracking.dictionaries import (
+    FAMILIES,
+    USUAL,
+    cells_of,
+    dictionary_of,
+    exact_readings,
+    has_quads,
+    size_for,
+)
 
 _TWICE = 2
+_TURNS = 4
+_PROBED = 3  # pictures that tell whether a family is there at all
+# Of two markers of the usual dictionary, or of one of a larger: less may be read by chance, or in a mirror.
+_SURE_BITS = 16.0
 _USUAL_FAMILY, _USUAL_COUNT = "4x4_1000", 50
 
 
@@ -49,26 +62,46 @@ class ShownMarkers:
 def find_markers(frames: Sequence[Frame]) -> ShownMarkers:
     """Markers that are read without a wrong cell in two of the pictures, or in one where there is no second.
 
-    Where two dictionaries read something in one place, that counts whose markers lie farther apart. Mirrored pictures
-    are looked at when nothing is found otherwise.
+    Where two dictionaries read something in one place, that counts whose markers lie farther apart. The pictures are
+    mirrored when what is read then is less likely to be chance.
     """
     images = [_gray(frame.image) for frame in frames]
-    plain = _found(images)
-    if plain:
+    shown = [picture for picture, image in enumerate(images) if has_quads(image)]
+    plain = _found(images, shown)
+    if _bits(plain) >= _SURE_BITS:
         return ShownMarkers(plain)
-    mirrored = _found([np.ascontiguousarray(image[:, ::-1]) for image in images])
+    mirrored = _found([np.ascontiguousarray(image[:, ::-1]) for image in images], shown)
+    if _bits(mirrored) <= _bits(plain):
+        return ShownMarkers(plain)
     width = images[0].shape[1]
-    return ShownMarkers(tuple(_unflipped(marker, width) for marker in mirrored), bool(mirrored))
+    return ShownMarkers(tuple(_unflipped(marker, width) for marker in mirrored), True)
 
 
-def _found(images: Sequence[Image]) -> tuple[ShownMarker, ...]:
+def _bits(markers: Sequence[ShownMarker]) -> float:
+    """How unlikely it is that random cells read as these markers: -log2 of the chance, by their dictionaries' sizes."""
+    total = 0.0
+    for name in {marker.dictionary for marker in markers}:
+        cells = (cells_of(name) - 2) ** 2
+        words = _TURNS * len(dictionary_of(name).bytesList)
+        total += sum(marker.dictionary == name for marker in markers) * (cells - float(np.log2(words)))
+    return total
+
+
+def _found(images: Sequence[Image], shown: Sequence[int]) -> tuple[ShownMarker, ...]:
+    """The markers in those of the images that may show some."""
     least = min(_TWICE, len(images))
     taken: list[list[Floats]] = [[] for _ in images]
     found: list[ShownMarker] = []
+    probed = [shown[number] for number in spread_evenly(len(shown), _PROBED)]
     for family in FAMILIES:
         places: dict[int, dict[int, Floats]] = {}
-        for picture, image in enumerate(images):
-            for number, corners in sorted(exact_readings(family, image), key=lambda reading: -_side_px(reading[1])):
+        # Most families are in no picture at all, and each picture costs a search.
+        for picture in sorted(shown, key=lambda number: number not in probed):
+            if picture not in probed and not places:
+                break
+            for number, corners in sorted(
+                exact_readings(family, images[picture]), key=lambda reading: -_side_px(reading[1])
+            ):
                 if not any(_is_there(corners, other) for other in taken[picture]):
                     places.setdefault(number, {}).setdefault(picture, corners)
         often = {number: seen for number, seen in places.items() if len(seen) >= least}

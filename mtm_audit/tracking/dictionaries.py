@@ -24,6 +24,7 @@ FAMILIES = (
 # What is most used of a family's sizes; markers have the same numbers in all of them.
 _USUAL_SIZE = 250
 _TWICE = 2
+_FEWEST_WORDS = "apriltag_16h5"
 
 
 @lru_cache
@@ -90,6 +91,12 @@ def exact_readings(family: str, image: Image) -> list[tuple[int, Floats]]:
         (int(number), np.asarray(quad, dtype=np.float64).reshape(4, 2))
         for number, quad in zip(found, quads, strict=True)
     ]
+
+
+def has_quads(image: Image) -> bool:
+    """Whether a picture shows any dark quadrangle that might be a marker."""
+    quads, _, others = cv2.aruco.ArucoDetector(dictionary_of(_FEWEST_WORDS), detector_parameters()).detectMarkers(image)
+    return bool(len(quads) or len(others))
 
 
 def _seen_of(family: str, images: Sequence[Image]) -> tuple[str, dict[int, int]]:

@@ -1,5 +1,7 @@
 """A picture of a film with a grid of pixel numbers and what was found in it."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from mtm_audit.drawing.grid import draw_grid
@@ -9,6 +11,7 @@ from mtm_audit.drawing.palette import colour_of
 from mtm_audit.model.picture import Image
 from mtm_audit.model.track import Floats
 from mtm_audit.survey.film import FilmSurvey
+from mtm_audit.tracking.cover import parse_colour
 from mtm_audit.tracking.region import Region
 
 
@@ -19,7 +22,10 @@ def survey_picture(survey: FilmSurvey) -> Image:
     marks = [*_markers(survey, number), *_colours(survey, number)]
     if number == 0:
         marks += [_region_mark(f"flow:{','.join(map(str, region))}", region, 0) for region in survey.regions]
-    coloured = [Mark(**{**vars(mark), "colour": colour_of(place)}) for place, mark in enumerate(marks)]
+    coloured = [
+        mark if mark.name.startswith("#") else replace(mark, colour=colour_of(place))
+        for place, mark in enumerate(marks)
+    ]
     names = survey.files[0].name + (f" and {len(survey.files) - 1} more" if len(survey.files) > 1 else "")
     return draw(draw_grid(frame.image), coloured, [f"{names} at {frame.time_s:.3f} s"])
 
@@ -48,7 +54,7 @@ def _markers(survey: FilmSurvey, number: int) -> list[Mark]:
 
 def _colours(survey: FilmSurvey, number: int) -> list[Mark]:
     return [
-        _region_mark(colour.name, colour.boxes[number], 2)
+        replace(_region_mark(colour.name, colour.boxes[number], 2), colour=parse_colour(colour.name))
         for colour in survey.colours
         if number in colour.boxes and not colour.is_background
     ]

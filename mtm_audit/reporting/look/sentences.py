@@ -17,6 +17,10 @@ _TIMES = {
 _MARKER_M = 0.1
 _LEAST_MARKER_PX = 20.0
 _MOST_LISTED = 12
+_NOTHING = (
+    "nothing that a tracker finds by itself; put a marker or a colour on each robot, or name a region that shows one "
+    "with --tracker flow:X0,Y0,X1,Y1"
+)
 
 # A line's head, empty where it goes on, and the line.
 Line = tuple[str, str]
@@ -115,7 +119,7 @@ def _colour(colour: ShownColour) -> str:
 
 def _motions(survey: FilmSurvey) -> list[str]:
     if not survey.motions:
-        return [] if survey.regions else ["nothing that a tracker finds by itself"]
+        return [] if survey.regions else [_NOTHING]
     still = [motion for motion in survey.motions if motion.is_still]
     said = [_motion(motion) for motion in survey.motions if not motion.is_still][:_MOST_LISTED]
     return said + ([f"{_listed([motion.name for motion in still])}: at rest"] if still else [])
@@ -135,20 +139,25 @@ def _carries(survey: FilmSurvey) -> list[str]:
         coded = survey.compression
         quantiser = "" if coded.quantiser is None else f", quantiser {coded.quantiser:.0f}"
         line = (
-            f"motion of a sharp marker down to {low_px:.2f} to {high_px:.2f} px, and several times as much of small or "
-            f"soft things ({coded.bits_per_pixel:.2g} bits a pixel{quantiser})"
+            f"motion of a sharp marker down to {_range(low_px, high_px, '.2f')} px, and several times as much of small "
+            f"or soft things ({coded.bits_per_pixel:.2g} bits a pixel{quantiser})"
         )
         if survey.markers.markers:
             side_px = float(min(marker.side_px for marker in survey.markers.markers))
             per_m = side_px / _MARKER_M
             line += (
                 f"; if markers are 10 cm wide, the smallest has {per_m:.0f} px a metre, so that is "
-                f"{1000.0 * low_px / per_m:.2g} to {1000.0 * high_px / per_m:.2g} mm"
+                f"{_range(1000.0 * low_px / per_m, 1000.0 * high_px / per_m, '.2g')} mm"
             )
         said.append(line)
     if survey.highest_hz is not None:
         said.append(f"motion up to {survey.highest_hz:.3g} Hz, half of the pictures a second")
     return said
+
+
+def _range(low: float, high: float, form: str) -> str:
+    texts = f"{low:{form}}", f"{high:{form}}"
+    return texts[0] if texts[0] == texts[1] else " to ".join(texts)
 
 
 def _body(body: Body) -> str:

@@ -14,12 +14,13 @@ from mtm_audit.drawing.film import film_writer, write_picture
 from mtm_audit.drawing.mark import Mark
 from mtm_audit.drawing.output import check_output_path
 from mtm_audit.drawing.overlay import draw
-from mtm_audit.drawing.sheet import contact_sheet, spread_evenly
+from mtm_audit.drawing.sheet import contact_sheet
 from mtm_audit.ingest.films import film_frames
 from mtm_audit.ingest.source import Source
 from mtm_audit.model.picture import Frame, Image
 from mtm_audit.model.pictured import Pictured
 from mtm_audit.model.recording import Recording
+from mtm_audit.model.spread import spread_evenly
 from mtm_audit.reporting.overlay.marks import Marker
 from mtm_audit.reporting.overlay.passing import Windows, tracks_by_body, windows_of
 from mtm_audit.reporting.text import verdict_sentence
