@@ -89,8 +89,9 @@ def _timeline(timeline: Timeline, what: str) -> str:
     if timeline.rate_hz is None:
         return span
     kind = "constant" if timeline.is_constant else "variable"
-    gaps = "" if not timeline.gaps else f", {timeline.gaps} gaps of up to {timeline.longest_s:.2f} s"
-    return f"{span}, {timeline.rate_hz:.4g} a second, {kind}{gaps}"
+    longest = f"{timeline.longest_s:.2f} s"
+    many = f", a gap of {longest}" if timeline.gaps == 1 else f", {timeline.gaps} gaps of up to {longest}"
+    return f"{span}, {timeline.rate_hz:.4g} a second, {kind}{many if timeline.gaps else ''}"
 
 
 def _markers(survey: FilmSurvey) -> list[str]:
