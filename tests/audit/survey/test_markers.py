@@ -19,7 +19,7 @@ def test_markers_of_any_dictionary_are_named(dictionary):
     assert not found.mirrored
 
 
-def test_a_number_beyond_the_usual_size_needs_a_larger_dictionary():
+def test_a_number_beyond_the_usual_size_needs_a_larger_one():
     found = find_markers(pictures((marker("4x4_1000", 120, 48), (80, 80)), (marker("4x4_50", 1, 48), (200, 120))))
     assert found.dictionaries == ("4x4_250",)
     assert [one.number for one in found.markers] == [1, 120]

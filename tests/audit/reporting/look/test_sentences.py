@@ -99,7 +99,7 @@ def test_markers_are_told_by_dictionary():
     assert "come closer" in text
 
 
-def test_the_limit_of_the_codec_is_told_in_pixels_and_millimetres():
+def test_the_limit_of_the_codec_is_told_in_px_and_mm():
     coded = replace(
         EMPTY, compression=Compression("h264", 0.02, 23.0), markers=ShownMarkers((shown("4x4_50", 1, 30.0),))
     )
