@@ -72,6 +72,14 @@ def test_labels_do_not_lie_on_each_other():
         assert has_colour(picture, mark.colour).sum() > 0.5 * count
 
 
+def test_a_label_that_found_no_room_is_led_to_its_mark():
+    crowd = [Mark(name="WWWWWWWW", place=(240 + 3 * n, 200 + 2 * n), colour=colour_of(n)) for n in range(8)]
+    last = crowd[-1]
+    led = has_colour(draw(GRAY, crowd), last.colour).sum()
+    alone = has_colour(draw(GRAY, [last]), last.colour).sum()
+    assert led > alone
+
+
 @pytest.mark.parametrize("place", [(-500.0, 20.0), (479.0, 359.0), (0.0, 0.0), (1e6, -1e6)])
 def test_places_at_and_beyond_the_edge_are_drawn(place):
     mark = Mark(name="a long name", place=place, outline=square(*place), heading_rad=1.0, passed=1.5, notes=("x",))
