@@ -1,4 +1,4 @@
-"""The command line: `mtm-hil <command>`. Exit codes: 0 done, 1 error, 2 usage, 130 interrupted."""
+"""The command line: `mtm-hil <command>`. Exit codes: docs/command-line.md."""
 
 from collections.abc import Sequence
 from enum import StrEnum
@@ -21,10 +21,11 @@ from hil.commands.options import (
 )
 from hil.commands.paper_cli import paper
 from hil.commands.verdicts_cli import verdicts
+from mtm_audit.commands.manner import HELP_OPTIONS, version_option
 
 app = typer.Typer(
     help="Robots that send messages through motion, simulated with the real onboard software in the loop.",
-    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False,
+    no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, context_settings=HELP_OPTIONS,
 )  # fmt: skip
 
 
@@ -63,7 +64,9 @@ class QualityName(StrEnum):
 
 
 @app.callback()
-def _every_command() -> None:
+def _every_command(
+    version: Annotated[bool, version_option("mtm-hil")] = False,
+) -> None:
     pass
 
 
@@ -73,7 +76,9 @@ def record(
     out: NewFolder,
     message: MessageNumber = None,
     no_message: NoMessage = False,
-    seconds: Annotated[float, typer.Option(help="Length of the recording.")] = 26.0,
+    seconds: Annotated[
+        float, typer.Option(metavar="SECONDS", min=0.1, max=86_400.0, help="Length of the recording.")
+    ] = 26.0,
     key: KeyFile = None,
     wire: Annotated[WireName, typer.Option(help="CAN, plaintext or MAVLink protocol, or no wire.")] = WireName.CAN,
     seed: WorldSeed = 0,
@@ -85,10 +90,17 @@ def record(
         QualityName | None, typer.Option(help="Encode the film as these do; nearly lossless without.")
     ] = None,
     shake_px: Annotated[
-        float, typer.Option(min=0.0, max=100.0, help="How far a hand shakes the camera, rms in pixels below 3 Hz.")
+        float,
+        typer.Option(
+            metavar="PIXELS", min=0.0, max=100.0, help="How far a hand shakes the camera, rms in pixels below 3 Hz."
+        ),
     ] = 0.0,
-    pan_deg: Annotated[float, typer.Option(min=-60.0, max=60.0, help="How far the camera pans while it films.")] = 0.0,
-    roll_deg: Annotated[float, typer.Option(min=0.0, max=45.0, help="How far the camera rolls to and fro.")] = 0.0,
+    pan_deg: Annotated[
+        float, typer.Option(metavar="DEGREES", min=-60.0, max=60.0, help="How far the camera pans while it films.")
+    ] = 0.0,
+    roll_deg: Annotated[
+        float, typer.Option(metavar="DEGREES", min=0.0, max=45.0, help="How far the camera rolls to and fro.")
+    ] = 0.0,
     floor: Annotated[
         FloorName, typer.Option(help="A faint mat, a carpet, or a mat with markers on it.")
     ] = FloorName.MAT,
@@ -135,7 +147,7 @@ def film(
     out: NewFolder,
     message: MessageNumber = None,
     no_message: NoMessage = False,
-    seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Length of the film.")] = 30.0,
+    seconds: Annotated[float, typer.Option(metavar="SECONDS", min=1.0, max=3600.0, help="Length of the film.")] = 30.0,
     key: KeyFile = None,
     seed: WorldSeed = 0,
     renderer: RendererName = Renderer.SOFTWARE,

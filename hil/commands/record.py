@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from hil.commands.new_folder import new_folder
+from hil.commands.new_folder import check_new, new_folder
 from hil.fleet.lockstep import run_lockstep
 from hil.fleet.realtime import START_S, run_realtime
 from hil.fleet.recording import Sensors, write_recording
@@ -57,6 +57,7 @@ class RecordOptions:
 
 def record(options: RecordOptions, console: Console) -> None:
     """Write the recording folder, whole or not at all; raises MtmError when it exists or an option does not fit."""
+    check_new(options.out)
     work, chassis = arena_task(options.plant), _chassis(options.plant)
     key = generate_key("hil", _scheme(options.plant)) if options.key is None else load_key(options.key)
     framed = key.scheme.framing is not None

@@ -29,7 +29,7 @@ from hil.experiments.verdicts.validity import (
     summarise_validity,
     validity_cells,
 )
-from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.errors import WrongValueError
 
 Row = tuple[object, ...]
 
@@ -64,7 +64,7 @@ def known_names(asked: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:
     names, choices = tuple(asked), tuple(known)
     for name in names:
         if name not in choices:
-            raise MtmError(f"there is no {name!r} to measure; choose from: {'; '.join(choices)}")
+            raise WrongValueError(f"there is no {name!r} to measure; choose from: {'; '.join(choices)}")
     return names
 
 

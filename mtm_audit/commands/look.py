@@ -13,14 +13,17 @@ from mtm_audit.drawing.output import check_output_path
 from mtm_audit.ingest.films import film_length
 from mtm_audit.ingest.source import Source, sources_of
 from mtm_audit.readers.logs.options import ReadOptions
+from mtm_audit.readers.video.clock import EvenClock
 from mtm_audit.reporting.look.commands import film_commands, log_commands
 from mtm_audit.reporting.look.json_text import film_entry, log_entry, look_report
 from mtm_audit.reporting.look.picture import survey_picture
 from mtm_audit.reporting.look.sentences import Line, film_lines, log_lines
 from mtm_audit.survey.film import survey_film
 from mtm_audit.survey.log import survey_log
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import MtmError, command_line_values
+from mtm_onboard.protocol.output_file import check_outputs
 
+_COMMAND = "mtm-audit look"
 _HEAD = 11
 
 
@@ -32,6 +35,7 @@ class LookOptions:
     picture: Path | None
     as_json: bool
     frame_rate_hz: float | None
+    force: bool = False
     reading: ReadOptions = field(default_factory=ReadOptions)
 
 
@@ -42,6 +46,10 @@ def run_look(options: LookOptions) -> int:
     """
     if options.picture is not None:
         check_output_path(options.picture, (".png",))
+    check_outputs(_COMMAND, options.picture, force=options.force)
+    if options.frame_rate_hz is not None:
+        with command_line_values():
+            EvenClock(options.frame_rate_hz)
     sources = sources_of(options.paths)
     if options.picture is not None:
         _check_picture(options.picture, sources)
@@ -91,7 +99,7 @@ def _film(options: LookOptions, source: Source, paths: tuple[Path, ...]) -> tupl
         )
     commands = film_commands(survey, paths, options.frame_rate_hz)
     if options.picture is not None:
-        write_picture(survey_picture(survey), options.picture)
+        write_picture(survey_picture(survey), options.picture, _COMMAND, force=options.force)
     lines = film_lines(survey, options.frame_rate_hz)
     return _text(lines, commands, survey.warnings), [film_entry(survey, commands)]
 

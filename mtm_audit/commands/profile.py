@@ -13,8 +13,9 @@ from mtm_audit.detectors.matched.profile import PlantProfile, save_profile
 from mtm_audit.ingest.recording import read_recording, recording_files
 from mtm_audit.readers.logs.options import ReadOptions
 from mtm_audit.tracking.registry import tracker
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import MtmError, command_line_values
 from mtm_onboard.protocol.key import Key, load_key
+from mtm_onboard.protocol.output_file import check_outputs
 
 
 @dataclass(frozen=True)
@@ -28,13 +29,14 @@ class ProfileOptions:
     reference: tuple[str, ...]
     settings: DecodeSettings
     reading: ReadOptions = field(default_factory=ReadOptions)
+    force: bool = False
 
 
 def run_profile(options: ProfileOptions) -> None:
     """Decode, learn, write. Raises MtmError when the recording does not decode, since its plant is then unknown."""
-    if not options.out.parent.is_dir():
-        raise MtmError(f"there is no folder {options.out.parent} to write the profile to; make it first")
-    tracker(options.tracker)
+    check_outputs("mtm-audit profile", options.out, force=options.force)
+    with command_line_values():
+        tracker(options.tracker)
     key = load_key(options.key)
     files, kind = recording_files(options.paths)
     recording = read_recording(files, kind, options.tracker, options=options.reading, reference=options.reference)

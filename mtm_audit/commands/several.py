@@ -38,6 +38,18 @@ def run_each(
     return _together(codes)
 
 
+def check_together(recordings: int, times: int, onset_s: float | None, speed: float | None) -> None:
+    """Raise MtmError unless so many recordings can be decoded together, for which so many times are given."""
+    if recordings < 2:
+        raise MtmError("--together needs two recordings or more; name them, each a film, a log or a folder of logs")
+    if onset_s is not None:
+        raise MtmError("--onset is an instant of one recording; leave it or --together out")
+    if speed is None:
+        raise MtmError("--search-speed looks at one recording; find its speed alone, and give it as --speed")
+    if times not in (0, recordings):
+        raise MtmError(f"--at says when {times} of {recordings} recordings began; name one time for each, with commas")
+
+
 def _together(codes: Sequence[int]) -> int:
     if 1 in codes:
         return 1

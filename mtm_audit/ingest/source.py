@@ -54,6 +54,14 @@ def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
     return _joined(found)
 
 
+def recordings_of(paths: Sequence[Path]) -> tuple[Source, ...]:
+    """The recordings behind `paths` where each path is one by itself, films and logs alike; a folder of films several.
+
+    Raises MtmError as `sources_of` does.
+    """
+    return tuple(source for path in paths for source in sources_of([path]))
+
+
 def _joined(found: Sequence[Source]) -> tuple[Source, ...]:
     films = tuple(source for source in found if source.kind == "video")
     bodies = tuple(file for source in found if source.kind != "video" for file in source.files)

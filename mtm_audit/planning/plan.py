@@ -8,7 +8,7 @@ from functools import cached_property
 from mtm_audit.planning.curve import Curve
 from mtm_audit.planning.family import Strategy
 from mtm_audit.planning.interval import message_interval
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import WrongValueError
 
 LONGEST_PAYLOAD_BITS = 1024
 
@@ -27,12 +27,12 @@ class Problem:
 
     def __post_init__(self) -> None:
         if not 1 <= self.payload_bits <= LONGEST_PAYLOAD_BITS:
-            raise MtmError(
+            raise WrongValueError(
                 f"a payload of {self.payload_bits} bits cannot be planned; one message carries 1 to "
                 f"{LONGEST_PAYLOAD_BITS}, so send a longer payload in several messages"
             )
         if not 0.0 < self.target_accuracy < 1.0:
-            raise MtmError(
+            raise WrongValueError(
                 f"the target accuracy is {self.target_accuracy:g}; choose one above 0 and below 1, since no number of "
                 "trials shows certainty"
             )

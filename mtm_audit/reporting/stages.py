@@ -104,6 +104,10 @@ def _timing_line(channel: ChannelDecoding, decoding: Decoding) -> str:
     if reading is None:
         return f"{channel.channel.name}: not read"
     how = "given" if decoding.settings.onset_s is not None else "found"
+    if decoding.verdict == "absent":
+        # Without a message the likeliest start is that of chance.
+        given = f"{channel.onset_s:.3f} s is looked at, as given" if how == "given" else "no start was found"
+        return f"{channel.channel.name}: {given}"
     return (
         f"{channel.channel.name}: the message begins at {channel.onset_s:.3f} s ({how}), ticks at "
         f"{reading.timing.rate_hz:.2f} Hz"
@@ -116,11 +120,12 @@ def _detector_lines(decoding: Decoding) -> tuple[str, ...]:
         if channel.reading is not None:
             ranked = np.sort(channel.reading.scores, axis=1)
             windows = len(channel.reading.window_positions)
-            margin = float(np.mean(ranked[:, -1] - ranked[:, -2]))
-            lines.append(
-                f"{channel.channel.name}: {windows} windows, best score {float(ranked[:, -1].mean()):.3f}, "
-                f"{margin:.3f} ahead of the next"
-            )
+            line = f"{channel.channel.name}: {windows} windows"
+            if decoding.verdict != "absent":
+                # Without a message the best symbol is that of chance, and its lead would look like a message.
+                margin = float(np.mean(ranked[:, -1] - ranked[:, -2]))
+                line += f", best score {float(ranked[:, -1].mean()):.3f}, {margin:.3f} ahead of the next"
+            lines.append(line)
     lines.append(f"{decoding.settings.detector}: {evidence_sentence(decoding)}")
     lines += [line for line in [decoys_sentence(decoding)] if line]
     return tuple(lines)

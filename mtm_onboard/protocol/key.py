@@ -10,7 +10,7 @@ from typing import Any
 
 from mtm_onboard.protocol.atomicfile import write_new
 from mtm_onboard.protocol.codebook import Codebook
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import MtmError, WrongValueError
 from mtm_onboard.protocol.holding import Holding, Secret, holding_of
 from mtm_onboard.protocol.holding_file import MOST_DAYS, holding_from_table, holding_text
 from mtm_onboard.protocol.input_file import LARGEST_TEXT_BYTES, BrokenTextError, decoded, opened, parsed_toml
@@ -75,13 +75,13 @@ def generate_master(key_id: str, scheme: Scheme, first_day: date, days: int) -> 
     if scheme.schedule != "rolling":
         raise MtmError('keys of format 2 have a day\'s key for each day; make the schedule "rolling"')
     if not 1 <= days <= MOST_DAYS:
-        raise MtmError(f"a key is for 1 to {MOST_DAYS} days, not {days}; give fewer")
+        raise WrongValueError(f"a key is for 1 to {MOST_DAYS} days, not {days}; give fewer")
     return Key(key_id, new_master(key_id, scheme, first_day, days), scheme)
 
 
 def _check_id(key_id: object) -> None:
     if not isinstance(key_id, str) or not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", key_id):
-        raise MtmError(
+        raise WrongValueError(
             f"the key id {key_id!r} is not usable; take 1 to 64 letters, digits, dots, dashes or underscores"
         )
 

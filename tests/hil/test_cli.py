@@ -215,7 +215,7 @@ def test_calibrating_writes_the_plant_and_prints_candidates(quick_rollouts, tmp_
     cells, plant = tmp_path / "cells.jsonl", tmp_path / "plant.toml"
     assert run("calibrate", "-n", 2, "--out", plant, "--cells", cells) == 0
     assert "slip_mps = 0.0425\n" in plant.read_text()
-    assert plant.read_text().startswith("# Written by: mtm-hil calibrate -n 2\n")
+    assert plant.read_text().startswith("# mtm-hil calibrate -n 2\n")
     output = capsys.readouterr().out
     assert output.count("(75)") == 6 * len(SLIPS_MPS)
     assert len(cells.read_text().splitlines()) == 2 * 6 * len(SLIPS_MPS)

@@ -24,9 +24,10 @@ LIBRARIES = {
     "mavlink": ["pymavlink"],
     "logs": ["ezc3d", "mcap", "mcap_protobuf", "pymavlink", "pyulog", "rosbags"],
     "parquet": ["pyarrow"],
+    "cluster": ["distributed"],
     "worlds": ["vmas", "mujoco", "Box2D"],
 }
-COMPLETE = ("audit", "logs", "parquet", "hil", "worlds")
+COMPLETE = ("audit", "logs", "parquet", "cluster", "hil", "worlds")
 
 pytestmark = pytest.mark.long
 

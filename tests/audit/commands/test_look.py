@@ -247,7 +247,7 @@ def test_what_is_no_recording_is_refused(look, tmp_path, make, words):
 
 
 def test_a_picture_that_cannot_be_drawn_is_refused(look, folder, tmp_path):
-    refused(look(folder / "film.mp4", "--picture", tmp_path / "grid.jpg"), "end the name in .png")
+    refused(look(folder / "film.mp4", "--picture", tmp_path / "grid.jpg"), "end the name in .png", code=2)
     refused(look(folder / "film.mp4", "--picture", tmp_path / "no" / "grid.png"), "choose a folder that exists")
     rows = table(tmp_path / "left.csv", [(0.1 * number, 0.0, 0.0) for number in range(20)])
     refused(look(rows, "--picture", tmp_path / "grid.png"), "has no pictures to draw on")
@@ -261,7 +261,8 @@ def test_a_picture_of_the_recording_is_not_drawn_over(look, tmp_path):
         cv2.imwrite(str(tmp_path / f"{number:03d}.png"), frame.image)
     before = (tmp_path / "000.png").read_bytes()
     pictures = sorted(tmp_path.iterdir())
-    refused(look(*pictures, "--frame-rate", "30", "--picture", tmp_path / "000.png"), "is the recording itself")
+    answer = look(*pictures, "--frame-rate", "30", "--picture", tmp_path / "000.png", "--force")
+    refused(answer, "is the recording itself")
     assert (tmp_path / "000.png").read_bytes() == before
 
 
@@ -270,6 +271,10 @@ def test_a_film_that_changes_its_size_is_refused(look, tmp_path):
         size = (200 + 20 * (number > 1), 100, 3)
         cv2.imwrite(str(tmp_path / f"{number}.png"), np.full(size, 99, np.uint8))
     refused(look(tmp_path, "--frame-rate", "30"), "the picture changes from 100 x 200 to 100 x 220")
+
+
+def test_a_rate_that_cannot_be_is_a_wrong_value(look, folder):
+    refused(look(folder / "film.mp4", "--frame-rate", "0"), "above zero", code=2)
 
 
 def test_a_wrong_option_is_a_usage_error(look, folder):

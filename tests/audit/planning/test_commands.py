@@ -180,12 +180,12 @@ def test_a_plan_that_breaks_off_leaves_the_former_scheme(audit, folder, monkeypa
     def interrupted(*_args, **_kwargs):
         raise KeyboardInterrupt
 
-    (folder / "plan.toml").write_text("the former one")
+    (folder / "plan.toml").write_text("# mtm-audit plan: the former one")
     monkeypatch.setattr("mtm_onboard.protocol.schemefile.scheme_text", interrupted)
     code, out, err = audit("plan", "lander.csv", *JOB[:2], *JOB[4:], "--like", "lander.key", "--out", "plan.toml")
     assert (code, out) == (130, "")
     assert err == "mtm-audit: interrupted; nothing was written\n"
-    assert (folder / "plan.toml").read_text() == "the former one"
+    assert (folder / "plan.toml").read_text() == "# mtm-audit plan: the former one"
     assert not [name for name in os.listdir(folder) if name.startswith(".")]
 
 

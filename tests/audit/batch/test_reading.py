@@ -1,0 +1,148 @@
+"""What one recording's rows say, by the function that worker processes run."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from mtm_audit.batch import reading, told
+from mtm_audit.batch.reading import Work, read_rows
+from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.ingest.recording import read_recording
+from mtm_onboard.protocol import MtmError, save_key
+from mtm_onboard.protocol.key import Key
+from tests.audit.batch.recordings import KEY, SETTINGS, found_at, plan_of, record, save_keys
+from tests.audit.moving_robot import scheme_of
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    """A folder with both keys, a recording of each, and one without a message."""
+    folder = tmp_path_factory.mktemp("lab")
+    save_keys(folder)
+    record(folder / "sent.tum", 3)
+    record(folder / "silent.tum", None)
+    return folder
+
+
+def plan(lab, *names, **changes):
+    return plan_of([lab / f"{name}.key" for name in names], changes.pop("cache", lab / "cache"), **changes)
+
+
+def rows_of(lab, name, *keys, **changes):
+    return read_rows(Work(plan(lab, *keys, **changes), found_at(lab / name)))
+
+
+def test_a_row_says_what_a_decode_says(lab):
+    (row,) = rows_of(lab, "sent.tum", "fake")
+    decoding = decode_tracks(read_recording([lab / "sent.tum"], "motion capture").tracks, KEY, SETTINGS)
+    assert (
+        (row.verdict, row.message, row.message_kind) == (decoding.verdict, "3", "number") == ("decoded", "3", "number")
+    )
+    assert (row.bits, row.chance) == (f"{decoding.evidence.bits:.2f}", f"{decoding.evidence.p_value:.3g}")
+    assert (row.key_id, row.keys_tried, row.rows, row.error) == ("fake", "1", "1", "")
+    assert float(row.duration_s) == pytest.approx(7.6)
+
+
+def test_several_keys_cost_their_logarithm_in_bits(lab):
+    (alone,), (one_of_two,) = rows_of(lab, "sent.tum", "fake"), rows_of(lab, "sent.tum", "other", "fake")
+    assert float(one_of_two.bits) == pytest.approx(float(alone.bits) - 1.0, abs=0.011)
+    assert float(one_of_two.chance) == pytest.approx(2.0 * float(alone.chance), rel=0.01)
+    assert (one_of_two.key, one_of_two.keys_tried) == (str(lab / "fake.key"), "2")
+
+
+def test_evidence_that_one_key_needs_is_too_little_for_two(lab):
+    """At a threshold between what is there and what two keys leave of it."""
+    (alone,) = rows_of(lab, "sent.tum", "fake", settings=replace(SETTINGS, threshold=0.5))
+    limit = 1.5 * float(alone.chance)
+    asked = replace(SETTINGS, threshold=limit)
+    assert rows_of(lab, "sent.tum", "fake", settings=asked)[0].verdict != "absent"
+    assert rows_of(lab, "sent.tum", "fake", "other", settings=asked)[0].verdict == "absent"
+
+
+def test_absent_rows_of_several_keys_name_none(lab):
+    (row,) = rows_of(lab, "silent.tum", "fake", "other")
+    assert (row.verdict, row.key, row.key_id, row.message) == ("absent", "", "", "")
+    bits = [float(rows_of(lab, "silent.tum", name)[0].bits) for name in ("fake", "other")]
+    assert float(row.bits) == pytest.approx(max(bits) - 1.0, abs=0.011)
+    assert rows_of(lab, "silent.tum", "fake")[0].key == str(lab / "fake.key")
+
+
+def test_each_key_that_shows_something_has_a_row(lab, tmp_path):
+    same = Key("copy", KEY.secret, KEY.scheme)
+    save_key(same, lab / "copy.key")
+    rows = rows_of(lab, "sent.tum", "fake", "other", "copy")
+    assert [(row.key_id, row.verdict, row.rows) for row in rows] == [("fake", "decoded", "1"), ("copy", "decoded", "1")]
+
+
+def test_a_key_that_cannot_be_tried_is_told_beside_the_others(lab):
+    save_key(Key("long", KEY.secret, scheme_of(symbols=(1,), ticks=30_000)), lab / "long.key")
+    (row,) = rows_of(lab, "sent.tum", "fake", "long")
+    assert row.verdict == "decoded"
+    if row.warnings:
+        assert "long.key" in row.warnings
+
+
+def test_a_second_key_reads_the_tracks_of_the_first(lab, tmp_path, monkeypatch):
+    calls = []
+
+    def counted(*arguments, **options):
+        calls.append(arguments)
+        return read_recording(*arguments, **options)
+
+    monkeypatch.setattr(reading, "read_recording", counted)
+    first = rows_of(lab, "sent.tum", "other", cache=tmp_path)
+    again = rows_of(lab, "sent.tum", "other", cache=tmp_path)
+    rows_of(lab, "sent.tum", "fake", cache=tmp_path)
+    assert len(calls) == 1
+    assert replace(first[0], seconds="") == replace(again[0], seconds="")
+    rows_of(lab, "silent.tum", "fake", cache=tmp_path)
+    copy = tmp_path / "sent.tum"
+    copy.write_bytes((lab / "sent.tum").read_bytes())
+    read_rows(Work(plan(lab, "fake", cache=tmp_path), found_at(copy)))
+    assert len(calls) == 2
+
+
+def test_a_damaged_entry_of_the_cache_is_made_anew(lab, tmp_path):
+    (first,) = rows_of(lab, "sent.tum", "fake", cache=tmp_path)
+    (entry,) = tmp_path.iterdir()
+    whole = entry.read_bytes()
+    entry.write_bytes(whole[:1000])
+    assert replace(rows_of(lab, "sent.tum", "fake", cache=tmp_path)[0], seconds="") == replace(first, seconds="")
+    assert entry.read_bytes() == whole
+
+
+def test_what_has_not_changed_is_not_read_again(lab):
+    (row,) = rows_of(lab, "sent.tum", "fake")
+    work = Work(plan(lab, "fake"), found_at(lab / "sent.tum"), known_sha256=row.sha256)
+    assert read_rows(work) is None
+    assert read_rows(replace(work, known_sha256="0" * 64))[0].verdict == "decoded"
+
+
+@pytest.mark.parametrize("error", [MemoryError(), ValueError("odd\nfile"), RecursionError(), OSError(5, "I/O error")])
+def test_whatever_fails_in_one_recording_is_its_row(lab, monkeypatch, error):
+    monkeypatch.setattr(told, "decode_recording", lambda *arguments: (_ for _ in ()).throw(error))
+    (row,) = rows_of(lab, "sent.tum", "fake")
+    assert (row.verdict, len(row.sha256)) == ("unreadable", 64)
+    assert type(error).__name__ in row.error
+    assert row.error.isprintable()
+
+
+def test_a_damaged_file_says_why_in_its_row(lab):
+    (lab / "bad.mp4").write_bytes(bytes(999))
+    work = Work(plan(lab, "fake"), replace(found_at(lab / "bad.mp4")))
+    (row,) = read_rows(replace(work, found=replace(work.found, source=replace(work.found.source, kind="video"))))
+    assert row.verdict == "unreadable"
+    assert "is not a video that can be read" in row.error
+
+
+def test_another_version_elsewhere_ends_the_batch(lab):
+    with pytest.raises(MtmError, match="another version of the program or its libraries; install the same everywhere"):
+        rows_of(lab, "sent.tum", "fake", code="0" * 16)
+
+
+def test_paying_for_keys_is_what_the_evidence_allows(lab):
+    """The limit of every key together: n keys at a threshold each divided by n."""
+    (row,) = rows_of(lab, "sent.tum", "fake", "other", "copy")[:1]
+    (alone,) = rows_of(lab, "sent.tum", "fake")
+    assert float(alone.bits) - float(row.bits) == pytest.approx(math.log2(3.0), abs=0.011)
