@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mtm_audit.survey.film import FilmSurvey
-from mtm_audit.survey.log import LogSurvey
+from mtm_audit.survey.log import LogSurvey, Topic
 from mtm_audit.tracking.dictionaries import USUAL
 
 # What the pages call the key file everywhere.
@@ -28,11 +28,17 @@ def film_commands(survey: FilmSurvey, paths: Sequence[Path], frame_rate_hz: floa
 
 
 def log_commands(surveys: Sequence[LogSurvey], paths: Sequence[Path]) -> tuple[str, ...]:
-    """One command line for all files, or one for each of the first topics where one has to be named."""
-    topics = [topic.name for survey in surveys for topic in survey.topics if topic.bodies]
+    """One command line for all files, or one for each of the likeliest topics where one has to be named."""
+    topics = sorted((topic for survey in surveys for topic in survey.topics if topic.bodies), key=_suits, reverse=True)
     if not any(survey.topics for survey in surveys):
         return (_line(paths),)
-    return tuple(_line(paths, "--topic", topic) for topic in topics[:_MOST_TOPICS])
+    return tuple(_line(paths, "--topic", topic.name) for topic in topics[:_MOST_TOPICS])
+
+
+def _suits(topic: Topic) -> tuple[bool, float]:
+    """What moves comes first, and then what is told most often."""
+    rates_hz = [body.timeline.rate_hz or 0.0 for body in topic.bodies]
+    return any(body.travel > 0.0 for body in topic.bodies), max(rates_hz)
 
 
 def _line(paths: Sequence[Path], *options: str) -> str:

@@ -45,7 +45,8 @@ def log_lines(survey: LogSurvey) -> list[Line]:
     """What is in a log."""
     lines = [("log", f"{survey.path}: {survey.format or 'a table of numbers'}")]
     if survey.begun_unix_s is not None:
-        lines.append(("clock", f"stood at zero at {_utc(survey.begun_unix_s)}"))
+        first_s = min(body.timeline.begin_s for body in survey.bodies)
+        lines.append(("recorded", f"from {_utc(survey.begun_unix_s + first_s)} on, by its clock"))
     lines += _headed("bodies", [_body(body) for body in survey.bodies])
     said = []
     for topic in survey.topics:

@@ -138,7 +138,10 @@ def test_a_log_is_told_with_its_gaps_and_headings():
         "left: 11 samples, 1.0 s from 0.000 s on, 10 a second, constant, seen in 90 %, x,y in m, goes 2 m, "
         "headings in 50 %"
     )
-    assert said(replace(LOG, begun_unix_s=1.7e9), "clock") == "stood at zero at 2023-11-14 22:13:20 UTC"
+    assert said(replace(LOG, begun_unix_s=1.7e9), "recorded") == "from 2023-11-14 22:13:20 UTC on, by its clock"
+    later = replace(BODY, timeline=timeline_of(1.7e9 + np.arange(11) / 10.0))
+    since_1970 = replace(LOG, begun_unix_s=0.0, bodies=(later,))
+    assert said(since_1970, "recorded") == "from 2023-11-14 22:13:20 UTC on, by its clock"
     assert log_commands([LOG], [Path("a.bag")]) == ("mtm-audit decode a.bag --key robot.key",)
 
 
@@ -150,6 +153,15 @@ def test_a_topic_is_named_where_there_is_a_choice():
     assert "/scan: no poses" in text
     assert "/late: not looked at" in text
     assert log_commands([chosen], [Path("a.bag")]) == ("mtm-audit decode a.bag --key robot.key --topic /odom",)
+
+
+def test_topics_that_move_and_are_frequent_come_first():
+    still, slow = replace(BODY, travel=0.0), replace(BODY, timeline=timeline_of(np.arange(11.0)))
+    topics = tuple(
+        Topic(name=name, bodies=(body,)) for name, body in (("/wheel", still), ("/amcl", slow), ("/odom", BODY))
+    )
+    commands = log_commands([replace(LOG, bodies=(), topics=topics)], [Path("a.bag")])
+    assert [command.rpartition(" ")[2] for command in commands] == ["/odom", "/amcl", "/wheel"]
 
 
 @pytest.mark.parametrize("unix_s", [0.0, 1.7e9])
