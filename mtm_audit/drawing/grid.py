@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from mtm_audit.drawing.lettering import put_panel, text_px
+from mtm_audit.drawing.lettering import panel_size, put_panel, text_px
 from mtm_audit.drawing.palette import WHITE
 from mtm_audit.model.picture import Image
 
-_LINES = 12  # along the longer side, about
+_LINES = 20  # along the longer side, about
 _LEAST_STEP_PX = 10
 
 
@@ -30,11 +30,17 @@ def draw_grid(image: Image) -> Image:
     for row in range(step, height, step):
         _tint(shown[row : row + 1])
     size_px = max(round(0.7 * text_px(height)), 9)
-    for column in range(step, width - step // 3, step):
+    wide, high = panel_size([str(max(width, height))], size_px)
+    for column in range(_apart(step, wide), width - wide // 2, _apart(step, wide)):
         put_panel(shown, [str(column)], (column, 0), size_px, [WHITE])
-    for row in range(step, height - step // 3, step):
+    for row in range(_apart(step, high), height - high // 2, _apart(step, high)):
         put_panel(shown, [str(row)], (0, row), size_px, [WHITE])
     return shown
+
+
+def _apart(step: int, size_px: int) -> int:
+    """How far apart numbers stand: some lines, so that there is room between them."""
+    return step * -(-5 * size_px // (4 * step))
 
 
 def _tint(pixels: Image) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from mtm_audit.drawing.lettering import line_px, panel_size, put_panel, text_px
+from mtm_audit.drawing.lettering import line_px, panel_size, put_panel, text_px, wrapped
 from mtm_audit.drawing.mark import Mark
 from mtm_audit.drawing.palette import HALO, WHITE, Bgr
 from mtm_audit.model.picture import Image
@@ -78,6 +78,7 @@ def _draw_shape(image: Image, mark: Mark) -> None:
 
 def _with_caption(image: Image, lines: Sequence[str]) -> Image:
     size = text_px(image.shape[0])
+    lines = wrapped(lines, size, image.shape[1])
     strip = np.zeros((panel_size(lines, size)[1], *image.shape[1:]), np.uint8)
     put_panel(strip, lines, (0, 0), size, [WHITE] * len(lines))
     return np.concatenate([image, strip])

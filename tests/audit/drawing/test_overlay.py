@@ -42,6 +42,13 @@ def test_the_caption_hides_nothing_of_the_picture():
     assert picture[360:].max() == 255
 
 
+def test_a_caption_too_long_for_the_picture_goes_on_below():
+    short, long = draw(GRAY, [], ("one line",)), draw(GRAY, [], ("many words " * 12,))
+    assert long.shape[1] == short.shape[1]
+    assert long.shape[0] >= short.shape[0] + text_px(360)
+    assert draw(GRAY, [], ("W" * 200,)).shape == short.shape
+
+
 def test_a_thing_out_of_sight_is_drawn_at_its_last_place():
     trail = np.array([[100.0, 100.0], [120.0, 100.0], [np.nan, np.nan]])
     lost = Mark(name="a", place=None, trail=trail, colour=ORANGE)
