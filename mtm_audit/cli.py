@@ -221,6 +221,46 @@ def decode(
 
 
 @app.command()
+def look(
+    paths: Annotated[
+        list[Path],
+        typer.Argument(metavar="PATH", help="Videos, logs, motion-capture files, or a folder of those or of pictures."),
+    ],
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.png", help="Draw a picture of the film with pixel numbers and what was found."),
+    ] = None,
+    force: Force = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON (docs/look.md) instead of text.")] = False,
+    frame_rate: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Pictures a second that the camera took, whatever the file says."),
+    ] = None,
+    topic: _Topics = None,
+    body: _Bodies = None,
+    unit: _Unit = None,
+    time_unit: _TimeUnit = None,
+    up: _Up = None,
+    arrival_times: _ArrivalTimes = False,
+) -> None:
+    """Say what is in a recording, without a key: markers, colours, motion, times, and how to decode it.
+
+    Exit codes: 0 looked at, 1 error, 2 usage, 130 interrupted.
+    """  # fmt: skip
+    with reported("mtm-audit", "nothing was written"):
+        from mtm_audit.commands.look import LookOptions, run_look
+
+        reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        code = run_look(
+            LookOptions(
+                paths=tuple(paths), picture=picture, as_json=as_json, frame_rate_hz=frame_rate, reading=reading,
+                force=force,
+            )
+        )  # fmt: skip
+    raise typer.Exit(code)
+
+
+@app.command()
 @takes_options_of(
     decode,
     "onset",

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress
 
 from mtm_audit.commands.opened_key import KeySource, OpenedKey, opened_key
 from mtm_audit.commands.several import check_together, run_each
+from mtm_audit.commands.unused import unused_options
 from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.decoding.recorded import decode_recording, recorded_of
 from mtm_audit.decoding.settings import DecodeSettings
@@ -83,7 +85,7 @@ def run_decode(options: DecodeOptions) -> int:
         stages.append(Stage("key", (f"{key.id}, scheme {key.scheme.name} (fingerprint {key.scheme.fingerprint})",)))
         with stage("recording"):
             sources = recordings_of(options.paths) if options.together else sources_of(options.paths)
-            check_pictures(options.overlay, sources[0])
+            check_pictures(options.overlay, sources)
     if options.together:
         check_together(len(sources), len(options.each_at), options.settings.onset_s, options.speed)
         with _explained(options, stages):
@@ -92,7 +94,7 @@ def run_decode(options: DecodeOptions) -> int:
         return code
     if len(sources) > 1:
         report = ("--report",) if options.report else ()
-        single = (*(("--plot",) if options.plot else ()), *report, *options.overlay.options)
+        single = (*(("--plot",) if options.plot else ()), *report)
         return run_each(sources, single, options.as_json, lambda source: _report(options, opened, source, stages[:1]))
     text, code = _report(options, opened, sources[0], stages)
     sys.stdout.write(text)
@@ -108,7 +110,7 @@ def _check(options: DecodeOptions) -> None:
         if options.frame_rate_hz is not None:
             EvenClock(options.frame_rate_hz)
     page = None if options.report is None else options.report.path
-    check_outputs("mtm-audit decode", options.plot, page, force=options.force)
+    check_outputs("mtm-audit decode", options.plot, page, *options.overlay.paths, force=options.force)
     if options.plot is not None:
         from mtm_audit.reporting.plot import check_plot_path
 
@@ -257,7 +259,7 @@ def _draw_overlay(options: DecodeOptions, recording: Recording, decoding: Decodi
         task = progress.add_task("drawing", total=recording.frames)
         draw_overlay(
             recording, decoding, options.overlay, options.tracker, options.frame_rate_hz,
-            lambda done: progress.update(task, completed=done),
+            lambda done: progress.update(task, completed=done), force=options.force,
         )  # fmt: skip
 
 

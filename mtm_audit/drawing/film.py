@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 
 from mtm_audit.model.picture import Frame, Image
-from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.output_file import mark_of, marked_png, output_file
 
 _TIME_BASE = Fraction(1, 90_000)
 # The movie's own clock, in whole milliseconds by default, would round the time of the first picture.
@@ -21,15 +21,20 @@ _NOMINAL_HZ = 30
 
 
 @contextmanager
-def film_writer(path: Path) -> Iterator[Callable[[Frame], None]]:
+def film_writer(path: Path, command: str, *, force: bool = False) -> Iterator[Callable[[Frame], None]]:
     """Yield what takes one frame (blue, green and red) after the other and encodes it as H.264 into an MP4 at `path`.
 
     Each frame keeps its own time; none is held longer than the encoder holds it. A side of an odd number of pixels is
-    made one longer, as yuv420p wants. Raises MtmError when no frame came, or times do not increase.
+    made one longer, as yuv420p wants. The film carries the mark of `command`. Raises MtmError when no frame came, times
+    do not increase, or something stands there that the command did not make, unless with `force`.
     """
     import av
 
-    with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4", options=_MUXER) as container:
+    with (
+        output_file(path, command, force=force) as temporary,
+        av.open(str(temporary), "w", format="mp4", options=_MUXER) as container,
+    ):
+        container.metadata["comment"] = mark_of(command)
         stream = container.add_stream("libx264", rate=_NOMINAL_HZ, options=_ENCODER)
         stream.time_base = stream.codec_context.time_base = _TIME_BASE
         stream.pix_fmt = "yuv420p"
@@ -53,12 +58,12 @@ def film_writer(path: Path) -> Iterator[Callable[[Frame], None]]:
         container.mux(stream.encode(None))
 
 
-def write_picture(image: Image, path: Path) -> None:
-    """Write one picture as PNG; raises MtmError as `replacing` does."""
-    with replacing(path) as temporary:
+def write_picture(image: Image, path: Path, command: str, *, force: bool = False) -> None:
+    """Write one picture as PNG with the mark of `command`; raises MtmError as `output_file` does."""
+    with output_file(path, command, force=force) as temporary:
         done, content = cv2.imencode(".png", image)
         assert done
-        temporary.write_bytes(content.tobytes())
+        temporary.write_bytes(marked_png(content.tobytes(), command))
 
 
 def _even(image: Image) -> Image:

@@ -31,9 +31,3 @@ def contact_sheet(pictures: Sequence[Image], header: Sequence[str], columns: int
         upper, left = top + row * (height + _GAP_PX), _GAP_PX + column * (width + _GAP_PX)
         sheet[upper : upper + height, left : left + width] = picture
     return sheet
-
-
-def spread_evenly(count: int, most: int) -> tuple[int, ...]:
-    """Up to `most` of the numbers 0 to `count` - 1, evenly spread and without the very ends where there is room."""
-    chosen = (np.arange(min(most, count)) + 0.5) * count / max(min(most, count), 1)
-    return tuple(int(number) for number in chosen)

@@ -52,7 +52,7 @@ def frames(things, *, seconds=2.0, rate_hz=RATE_HZ, size=SIZE, shift=None, floor
         ground = np.full((size[1], size[0]), GRAY, np.uint8) if floor is None else floor[: size[1], : size[0]]
         picture = cv2.cvtColor(ground, cv2.COLOR_GRAY2BGR)
         for (thing, middle, _), path in zip(things, paths, strict=True):
-            picture = pasted(picture, thing, np.array(middle) + path[row])
+            paste(picture, thing, np.array(middle) + path[row])
         if shift is not None:
             move = np.array([[1.0, 0.0, shift[row, 0]], [0.0, 1.0, shift[row, 1]]])
             picture = cv2.warpAffine(picture, move, size, borderMode=cv2.BORDER_REPLICATE)
@@ -65,14 +65,17 @@ def _path(path, number, seconds, rate_hz):
     return np.zeros((round(seconds * rate_hz), 2)) if path is False else path
 
 
-def pasted(picture, thing, middle):
-    """The thing with its middle at a place between pixels."""
+def paste(picture, thing, middle):
+    """Put the thing with its middle at a place between pixels, which must be well inside of the picture, in place."""
     height, width = thing.shape[:2]
-    move = np.array([[1.0, 0.0, middle[0] - (width - 1) / 2], [0.0, 1.0, middle[1] - (height - 1) / 2]])
-    size = picture.shape[1], picture.shape[0]
+    corner = np.array([middle[0] - (width - 1) / 2, middle[1] - (height - 1) / 2])
+    left, upper = np.floor(corner).astype(int)
+    move = np.array([[1.0, 0.0, corner[0] - left], [0.0, 1.0, corner[1] - upper]])
+    size = width + 1, height + 1
     cover = cv2.warpAffine(np.ones((height, width), np.float32), move, size)[..., None]
-    over = cv2.warpAffine(thing, move, size, borderMode=cv2.BORDER_REPLICATE).astype(np.float32)
-    return np.rint(picture * (1 - cover) + over * cover).astype(np.uint8)
+    over = cv2.warpAffine(thing, move, size, borderMode=cv2.BORDER_REPLICATE)
+    under = picture[upper : upper + height + 1, left : left + width + 1]
+    under[:] = np.rint(under * (1 - cover) + over * cover)
 
 
 def film(path, things, **how):

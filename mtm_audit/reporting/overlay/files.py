@@ -14,18 +14,20 @@ from mtm_audit.drawing.film import film_writer, write_picture
 from mtm_audit.drawing.mark import Mark
 from mtm_audit.drawing.output import check_output_path
 from mtm_audit.drawing.overlay import draw
-from mtm_audit.drawing.sheet import contact_sheet, spread_evenly
+from mtm_audit.drawing.sheet import contact_sheet
 from mtm_audit.ingest.films import film_frames
 from mtm_audit.ingest.source import Source
 from mtm_audit.model.picture import Frame, Image
 from mtm_audit.model.pictured import Pictured
 from mtm_audit.model.recording import Recording
+from mtm_audit.model.spread import spread_evenly
 from mtm_audit.reporting.overlay.marks import Marker
 from mtm_audit.reporting.overlay.passing import Windows, tracks_by_body, windows_of
 from mtm_audit.reporting.text import verdict_sentence
 from mtm_audit.tracking.registry import tracker
 from mtm_onboard.protocol.errors import MtmError
 
+COMMAND = "mtm-audit decode"
 FILM_SUFFIXES, STILL_SUFFIXES = (".mp4",), (".png",)
 _SHEET_PICTURES = 12
 _THUMB_PX = 640  # the larger side of a picture on a sheet
@@ -38,6 +40,11 @@ class OverlayFiles:
     film: Path | None = None
     still: Path | None = None
     sheet: Path | None = None
+
+    @property
+    def paths(self) -> tuple[Path | None, ...]:
+        """Where they are written."""
+        return self.film, self.still, self.sheet
 
     @property
     def options(self) -> tuple[str, ...]:
@@ -56,11 +63,16 @@ def overlay_files(overlay: Path | None, sheet: Path | None) -> OverlayFiles:
     return OverlayFiles(overlay if is_film else None, None if is_film else overlay, sheet)
 
 
-def check_pictures(files: OverlayFiles, source: Source) -> None:
-    """Raise MtmError when something is to be drawn on a recording without pictures, or over the recording itself."""
-    if files.options and source.kind != "video":
+def check_pictures(files: OverlayFiles, sources: Sequence[Source]) -> None:
+    """Raise MtmError when something is to be drawn on several recordings, one without pictures, or over itself."""
+    if not files.options:
+        return
+    source = sources[0]
+    if len(sources) > 1:
+        raise MtmError(f"{files.options[0]} draws one recording, and {len(sources)} are named; name one")
+    if source.kind != "video":
         raise MtmError(f"{source.name} has no pictures to draw on; leave {' and '.join(files.options)} out")
-    for path in (files.film, files.still, files.sheet):
+    for path in files.paths:
         if path is not None and any(path.exists() and path.samefile(own) for own in source.files):
             raise MtmError(f"{path} is the recording itself; name another file to draw into")
 
@@ -72,11 +84,14 @@ def draw_overlay(
     tracker_name: str,
     frame_rate_hz: float | None = None,
     progress: Callable[[int], None] | None = None,
+    *,
+    force: bool = False,
 ) -> None:
     """Read the film once more and draw the files, whole or not at all; pictures are held one at a time.
 
     `tracker_name` and `frame_rate_hz` are those with which the recording was read. `progress` receives the number of
-    pictures read so far. Raises MtmError as reading and writing do.
+    pictures read so far; with `force` what the command did not make is replaced as well. Raises MtmError as reading and
+    writing do.
     """
     if recording.pictured is None:
         raise MtmError("the recording has no pictures to draw on; leave --overlay and --sheet out")
@@ -88,7 +103,7 @@ def draw_overlay(
     still_row = None if files.still is None else _still_row(recording.pictured, windows)
     sheet_rows = spread_evenly(recording.frames, _SHEET_PICTURES)
     thumbs: list[Image] = []
-    with nullcontext() if files.film is None else film_writer(files.film) as write:
+    with nullcontext() if files.film is None else film_writer(files.film, COMMAND, force=force) as write:
         frames = film_frames(recording.paths, "bgr", lambda sentence: None, frame_rate_hz)
         for row, frame in enumerate(frames):
             is_still, is_thumb = row == still_row, files.sheet is not None and row in sheet_rows
@@ -99,13 +114,14 @@ def draw_overlay(
                 if write is not None:
                     write(Frame(frame.time_s, draw(frame.image, marks, lines)))
                 if is_still and files.still is not None:
-                    write_picture(draw(frame.image, marks, lines), files.still)
+                    write_picture(draw(frame.image, marks, lines), files.still, COMMAND, force=force)
                 if is_thumb:
                     thumbs.append(_thumb(frame.image, marks, lines[0]))
             if progress is not None:
                 progress(row + 1)
     if files.sheet is not None:
-        write_picture(contact_sheet(thumbs, [*caption, f"drawn {datetime.now(UTC):%Y-%m-%d}"]), files.sheet)
+        sheet = contact_sheet(thumbs, [*caption, f"drawn {datetime.now(UTC):%Y-%m-%d}"])
+        write_picture(sheet, files.sheet, COMMAND, force=force)
 
 
 def _caption(recording: Recording, decoding: Decoding) -> tuple[str, str]:

@@ -13,7 +13,7 @@ def colours(count, size=(64, 48)):
 
 
 def written(path, times_s, size=(64, 48)):
-    with film_writer(path) as write:
+    with film_writer(path, "mtm-audit test") as write:
         for time_s, image in zip(times_s, colours(len(times_s), size), strict=True):
             write(Frame(time_s, image))
     return path
@@ -41,7 +41,7 @@ def test_odd_sizes_are_made_even(tmp_path, size):
 
 
 def broken_off(path):
-    with film_writer(path) as write:
+    with film_writer(path, "mtm-audit test", force=True) as write:
         write(Frame(0.0, colours(1)[0]))
         raise RuntimeError
 
@@ -55,7 +55,7 @@ def test_a_film_that_fails_leaves_nothing(tmp_path):
 
 
 def test_no_picture_and_times_that_run_back_are_refused(tmp_path):
-    with pytest.raises(MtmError, match="no frame"), film_writer(tmp_path / "a.mp4"):
+    with pytest.raises(MtmError, match="no frame"), film_writer(tmp_path / "a.mp4", "mtm-audit test"):
         pass
     with pytest.raises(MtmError, match="does not come after"):
         written(tmp_path / "a.mp4", (0.1, 0.1))
@@ -63,7 +63,26 @@ def test_no_picture_and_times_that_run_back_are_refused(tmp_path):
 
 
 def test_a_picture_is_written_whole(tmp_path):
-    write_picture(colours(1)[0], tmp_path / "a.png")
+    write_picture(colours(1)[0], tmp_path / "a.png", "mtm-audit test")
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG\r\n")
     with pytest.raises(MtmError, match="cannot write"):
-        write_picture(colours(1)[0], tmp_path / "nowhere" / "a.png")
+        write_picture(colours(1)[0], tmp_path / "nowhere" / "a.png", "mtm-audit test")
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.png"])
+def test_only_what_the_same_command_drew_is_replaced(tmp_path, name):
+    def drawn(command, force=False):
+        if name == "a.png":
+            write_picture(colours(1)[0], tmp_path / name, command, force=force)
+            return
+        with film_writer(tmp_path / name, command, force=force) as write:
+            write(Frame(0.0, colours(1)[0]))
+
+    drawn("mtm-audit test")
+    drawn("mtm-audit test")
+    before = (tmp_path / name).read_bytes()
+    with pytest.raises(MtmError, match="was not made by mtm-audit other"):
+        drawn("mtm-audit other")
+    assert (tmp_path / name).read_bytes() == before
+    drawn("mtm-audit other", force=True)
+    assert (tmp_path / name).read_bytes() != before

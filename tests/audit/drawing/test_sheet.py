@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mtm_audit.drawing.sheet import contact_sheet, spread_evenly
+from mtm_audit.drawing.sheet import contact_sheet
 
 
 def test_pictures_stand_in_their_order_in_rows():
@@ -17,10 +17,3 @@ def test_pictures_stand_in_their_order_in_rows():
 def test_a_sheet_of_nothing_is_an_error():
     with pytest.raises(ValueError, match="needs a picture"):
         contact_sheet([], ["header"])
-
-
-@pytest.mark.parametrize(
-    ("count", "most", "chosen"), [(0, 12, ()), (3, 12, (0, 1, 2)), (100, 4, (12, 37, 62, 87)), (1, 1, (0,))]
-)
-def test_numbers_are_spread_evenly(count, most, chosen):
-    assert spread_evenly(count, most) == chosen
