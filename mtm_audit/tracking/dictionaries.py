@@ -23,6 +23,7 @@ _FAMILIES = (
 # What is most used of a family's sizes; markers have the same numbers in all of them.
 _USUAL_SIZE = 250
 _TWICE = 2
+LEAST_CELL_PX = 2.0  # of a marker that is named; what is read of less is mostly writing
 
 
 @lru_cache
@@ -83,11 +84,14 @@ def _seen_of(family: str, images: Sequence[Image]) -> tuple[str, dict[int, int]]
     """The family, and in how many pictures each of its markers is, those left out that chance may have made."""
     parameters = detector_parameters()
     parameters.errorCorrectionRate = 0.0
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
     detector = cv2.aruco.ArucoDetector(dictionary_of(family), parameters)
     counts: Counter[int] = Counter()
     for image in images:
-        found = detector.detectMarkers(image)[1]
-        counts.update({int(number) for number in np.ravel(found)} if found is not None else ())
+        quads, found, _ = detector.detectMarkers(image)
+        if found is not None:
+            large = [np.sqrt(cv2.contourArea(quad)) >= LEAST_CELL_PX * cells_of(family) for quad in quads]
+            counts.update({int(number) for number in np.ravel(found)[large]})
     least = min(_TWICE, len(images))
     return family, {number: count for number, count in counts.items() if count >= least}
 
