@@ -133,7 +133,7 @@ def test_mean_windows_are_sorted_by_symbol_and_as_loud_as_noise(noise):
         assert int(np.argmax(fit)) == symbol
 
 
-def test_a_discriminant_tells_noise_from_none_and_not_from_itself():
+def test_a_discriminant_tells_noise_from_none_not_from_itself():
     draw = np.random.default_rng(6)
     quiet, loud, louder = (scale * draw.standard_normal((200, 64, 2)) for scale in (1.0, 2.0, 2.0))
     pairs, higher = ranked_higher(band_powers(loud), band_powers(quiet))
