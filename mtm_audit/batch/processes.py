@@ -17,7 +17,7 @@ R = TypeVar("R")
 
 # Numerical libraries read these when they are loaded. Several computing processes with more threads than there are
 # cores slow each other down.
-_SINGLE_THREADED = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+SINGLE_THREADED = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 # What ends a process may have been meant for another, such as when memory is short.
 _TRIES = 2
 
@@ -117,14 +117,23 @@ def _single_threaded() -> None:
 
 @contextmanager
 def _quiet_children() -> Iterator[None]:
-    """Start processes with one numerical thread that leave interrupts from the keyboard to this one, from the start."""
-    former = {name: os.environ.get(name) for name in _SINGLE_THREADED}
-    os.environ.update(_SINGLE_THREADED)
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    """Start processes that compute in one thread and leave interrupts from the keyboard to this one, from the start."""
+    with single_threaded_children():
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+@contextmanager
+def single_threaded_children() -> Iterator[None]:
+    """Processes that start in the block have one numerical thread each."""
+    former = {name: os.environ.get(name) for name in SINGLE_THREADED}
+    os.environ.update(SINGLE_THREADED)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         for name, value in former.items():
             if value is None:
                 del os.environ[name]
