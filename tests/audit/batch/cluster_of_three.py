@@ -39,5 +39,5 @@ def cluster_of(folder: Path, workers: int = 3) -> Iterator[Cluster]:
             start(f"worker{number}", "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
             for number in range(workers)
         )
-        until(lambda: (folder / "scheduler").read_text().count("Register worker addr") == workers)
+        until(lambda: (folder / "scheduler").read_text().count("Register worker ") == workers)
         yield Cluster(address, started)
