@@ -55,7 +55,7 @@ def test_chapters_are_one_film_and_a_missing_one_spares_others(lab):
 def test_pictures_of_a_folder_are_one_film(lab):
     lab("film/1.png", "film/2.png", "film/more/a.tum", "single/1.png")
     assert told(find("film")) == [("film", 1), ("film/more/a.tum", 1)]
-    assert told(find("film/1.png", "film/2.png", "single/1.png")) == [("film", 2), ("single/1.png", 0)]
+    assert told(find("film/1.png", "film/2.png", "single/1.png")) == [("film/1.png", 2), ("single/1.png", 0)]
 
 
 def test_each_path_that_cannot_be_read_says_why(lab):
