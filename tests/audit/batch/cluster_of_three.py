@@ -18,6 +18,7 @@ _DASK = (sys.executable, "-m", "dask")
 class Cluster:
     address: str
     workers: tuple[subprocess.Popen[bytes], ...]
+    scheduler: subprocess.Popen[bytes]
 
 
 @contextmanager
@@ -33,11 +34,11 @@ def cluster_of(folder: Path, workers: int = 3) -> Iterator[Cluster]:
             stack.callback(process.kill)
             return process
 
-        start("scheduler", "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show")
+        scheduler = start("scheduler", "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show")
         address = until(lambda: re.search(r"Scheduler at:\s+(tcp://\S+)", (folder / "scheduler").read_text()))[1]
         started = tuple(
             start(f"worker{number}", "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
             for number in range(workers)
         )
         until(lambda: (folder / "scheduler").read_text().count("Register worker ") == workers)
-        yield Cluster(address, started)
+        yield Cluster(address, started, scheduler)

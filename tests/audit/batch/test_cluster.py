@@ -34,6 +34,17 @@ def test_a_killed_worker_loses_and_doubles_nothing(calls, tmp_path):
     assert len(path.read_text().splitlines()) >= 30
 
 
+def test_a_scheduler_that_ends_gets_one_sentence(calls, tmp_path, capfd):
+    path = tmp_path / "begun"
+    with cluster_of(tmp_path, workers=1) as one:
+        results = on_cluster(calls.logged, [(str(path), 0.1)] * 30, one.address)
+        assert next(results)[1] == "done"
+        one.scheduler.kill()
+        with pytest.raises(MtmError, match=r"^the scheduler at tcp://.* is gone; start it again"):
+            list(results)
+    assert capfd.readouterr().err == ""
+
+
 @pytest.mark.long
 def test_what_kills_each_worker_is_lost_and_others_are_not(calls, tmp_path):
     with cluster_of(tmp_path, workers=6) as six:
