@@ -29,31 +29,37 @@ def in_processes(function: Callable[[T], R], arguments: Sequence[T], count: int)
     Leaving the iterator ends the processes at once.
     """
     waiting = [(place, 1) for place in reversed(range(len(arguments)))]
-    idle: list[_Process] = []
     busy: dict[Connection, tuple[_Process, int, int]] = {}
+
+    def begin(process: _Process) -> None:
+        place, number = waiting.pop()
+        process.begin(arguments[place])
+        busy[process.connection] = process, place, number
+
     try:
-        while waiting or busy:
-            while waiting and len(busy) < count:
-                place, number = waiting.pop()
-                process = idle.pop() if idle else _started(function)
-                process.begin(arguments[place])
-                busy[process.connection] = process, place, number
+        for _ in range(min(count, len(arguments))):
+            begin(_started(function))
+        while busy:
             for connection in wait(list(busy)):
                 assert isinstance(connection, Connection)
-                process, place, number = busy.pop(connection)
+                process, place, number = busy[connection]
                 try:
-                    result = process.result()
+                    result: R | Lost = process.result()
                 except EOFError:
+                    result = Lost()
+                del busy[connection]
+                again = isinstance(result, Lost) and number < _TRIES
+                if again:
+                    waiting.append((place, number + 1))
+                # Before the result is taken, which may take a while, so that the process need not wait for that.
+                if isinstance(result, Lost) or not waiting:
                     process.end()
-                    if number < _TRIES:
-                        waiting.append((place, number + 1))
-                    else:
-                        yield place, Lost()
-                    continue
-                idle.append(process)
-                yield place, result
+                if waiting:
+                    begin(_started(function) if isinstance(result, Lost) else process)
+                if not again:
+                    yield place, result
     finally:
-        for process in [*idle, *(process for process, *_ in busy.values())]:
+        for process, *_ in busy.values():
             process.end()
 
 
