@@ -100,6 +100,7 @@ def test_bad_files_are_named_and_all_others_are_read(lab, table):
         assert row["key"] == ("" if symbol is None else ("fake.key", "other.key")[number % 2])
 
 
+@pytest.mark.long
 def test_good_files_say_the_same_without_the_bad_ones(batch, table, tmp_path):
     assert batch(paths=[f"films/{number}.tum" for number in range(GOOD)])[0] == 0
     good = [line for line in without_times(table) if not line.startswith(tuple(f"films/{name}" for name in BAD))]

@@ -88,6 +88,7 @@ def test_a_process_that_is_ended_from_outside_gets_one_sentence(module, tmp_path
         run_sweep(module.ended_from_outside, cells(2), store, QUIET, workers=2)
 
 
+@pytest.mark.long
 def test_a_cluster_that_loses_a_worker_computes_the_same(module, tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}")
     log = tmp_path / "log"
