@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from hil.commands.clusters import takes_scheduler
 from hil.commands.codecs_cli import codecs
 from hil.commands.experiments_cli import EXPERIMENTS
 from hil.commands.options import (
@@ -198,6 +199,10 @@ for _experiment in EXPERIMENTS:
 app.add_typer(paper, name="paper")
 app.add_typer(verdicts, name="verdicts")
 app.add_typer(codecs, name="codecs")
+for _app in (app, paper, verdicts, codecs):
+    for _command in _app.registered_commands:
+        if _command.callback is not None:
+            _command.callback = takes_scheduler(_command.callback)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -13,7 +13,8 @@ from rich.console import Console
 from rich.table import Table
 
 from hil.commands.new_folder import new_folder
-from hil.fleet.programs import SINGLE_THREADED, program
+from hil.fleet.programs import program
+from mtm_audit.batch.processes import SINGLE_THREADED
 from mtm_onboard.protocol import MtmError
 
 MESSAGE = 0b10110010
