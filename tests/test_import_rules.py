@@ -24,7 +24,7 @@ LEVELS = {
     ),
     "mtm_audit": (
         "model", "readers", "tracking", "drawing", "ingest", "detectors", "significance", "decoding", "reporting",
-        "planning", "commands", "cli", "__main__",
+        "planning", "live", "commands", "cli", "__main__",
     ),
     "hil": (
         "plants", "wires", "vehicles", "sensors", "worlds", "fleet", "experiments.runs", "experiments.detectors",

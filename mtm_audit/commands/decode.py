@@ -29,7 +29,7 @@ from mtm_audit.reporting.text import print_report
 from mtm_audit.tracking.registry import tracker
 from mtm_onboard.protocol.key import Key
 
-_PIPE_COLUMNS = 140
+PIPE_COLUMNS = 140
 EXIT_CODES = {"decoded": 0, "absent": 3, "inconclusive": 4}
 
 
@@ -183,7 +183,7 @@ def _publish(options: DecodeOptions, opened: OpenedKey, recording: Recording, de
     if options.as_json:
         return json_report(recording, decoding, warnings, basis)
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS)
+    console = Console(width=None if sys.stdout.isatty() else PIPE_COLUMNS)
     with console.capture() as captured:
         print_report(console, recording, decoding, warnings, basis)
     return captured.get()

@@ -31,7 +31,7 @@ def opened_video(path: Path) -> Iterator[tuple["InputContainer", "VideoStream"]]
             f"{path} is not a video that can be read, or its end is missing; copy it again or convert it to MP4"
         ) from error
     with container:
-        stream = _film_of(path, container)
+        stream = film_of(path, container)
         # Damage is to stop the decoder: pictures that it patches up look plausible and are wrong.
         stream.codec_context.options = {"err_detect": "explode"}
         stream.thread_type = "AUTO"
@@ -45,8 +45,11 @@ def decoding_errors() -> tuple[type[Exception], ...]:
     return av.FFmpegError, OSError, ValueError
 
 
-def _film_of(path: Path, container: "InputContainer") -> "VideoStream":
-    """The first stream that is no still picture: drones and cutters put a cover into the file, often first."""
+def film_of(path: Path | str, container: "InputContainer") -> "VideoStream":
+    """The first stream that is no still picture: drones and cutters put a cover into the file, often first.
+
+    Raises MtmError, which names `path`, when there is none.
+    """
     streams = container.streams.video
     if not streams:
         raise MtmError(f"{path} holds no video stream; name a file with pictures in it")
