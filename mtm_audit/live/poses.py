@@ -82,10 +82,15 @@ def udp_poses(host: str, port: int, source: str, clock: Callable[[], float] = ti
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         receiver = socket.socket(family, socket.SOCK_DGRAM)
-        receiver.bind(address)
+        try:
+            receiver.bind(address)
+        except OSError:
+            receiver.close()
+            raise
     except OSError as error:
-        raise MtmError(f"cannot receive at {source}: {error.strerror}; choose an address of this machine and a free "
-                       "port") from error  # fmt: skip
+        raise MtmError(
+            f"cannot receive at {source}: {error.strerror}; choose an address of this machine and a free port"
+        ) from error
     with receiver:
         receiver.settimeout(_QUIET_S)
         lines = PoseLines(Timeline(), source)
@@ -120,6 +125,6 @@ class PoseTracks:
 
 
 def _track(name: str, table: np.ndarray) -> Track:
-    valid = np.isfinite(table[:, 1])
+    valid = np.isfinite(table[:, 1:3]).all(axis=1)
     turned = bool(np.isfinite(table[valid, 3]).any())
     return Track(name, table[:, 0], table[:, 1:3], valid, headings_rad=table[:, 3] if turned else None)
