@@ -8,6 +8,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
@@ -31,6 +32,10 @@ from mtm_audit.reporting.remarks import remarks
 from mtm_audit.reporting.text import print_report, verdict_sentence
 from mtm_audit.tracking.following import following
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.installing import missing_sentence
+
+if TYPE_CHECKING:
+    from mtm_audit.live.page import Page
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +84,7 @@ def run_watch(options: WatchOptions) -> int:
     """Watch and report; returns the exit code, that of decode. Raises MtmError when nothing can be watched."""
     opened = opened_key(options.key, options.settings.revoked)
     source = source_of(options.source)
+    served = None if options.page is None else _page_class()
     film = Film(following(options.tracker), options.reference) if source.is_film else None
     gathering: Gathering = film or Poses()
     settings = replace(options.settings, at=_recorded_at(options, source, opened))
@@ -91,10 +97,8 @@ def run_watch(options: WatchOptions) -> int:
         judge = JudgeBeside(opened.key, settings)
         stack.callback(judge.close)
         page = None
-        if options.page is not None:
-            from mtm_audit.live.page import Page
-
-            page = stack.enter_context(Page(state, options.page))
+        if served is not None:
+            page = stack.enter_context(served(state, options.page or 0))
             print(f"mtm-audit: the page is {page.url}", file=sys.stderr, flush=True)
         feed = Feed(source.events(film.following.pixels if film else "gray", film_record), is_live=source.is_live)
         stack.callback(feed.stop)
@@ -112,6 +116,15 @@ def run_watch(options: WatchOptions) -> int:
         if page is not None:
             page.let_it_be_seen()
     return code
+
+
+def _page_class() -> type["Page"]:
+    """What serves the page; raises MtmError when the library for it is not installed."""
+    try:
+        from mtm_audit.live.page import Page
+    except ModuleNotFoundError as error:
+        raise MtmError(missing_sentence(error, "--page", "live")) from error
+    return Page
 
 
 @contextmanager

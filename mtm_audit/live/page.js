@@ -80,8 +80,8 @@ function drawPlan(state) {
 async function showPicture() {
   const picture = document.getElementById("picture"), plan = document.getElementById("plan");
   const answer = await fetch("picture");
-  picture.hidden = answer.status !== 200;
-  plan.hidden = answer.status === 200;
+  picture.classList.toggle("none", answer.status !== 200);
+  plan.classList.toggle("none", answer.status === 200);
   if (answer.status !== 200) return;
   const bytes = new Uint8Array(await answer.arrayBuffer());
   let text = "";
