@@ -123,11 +123,14 @@ class FilmSource:
             return
         now_s = self.clock()
         stamp = packet.pts if packet.pts is not None else packet.dts
-        if is_stamped and stamp is not None and packet.time_base is not None:
-            self.timeline.offset_s(float(stamp * packet.time_base), now_s)
+        shift_s = None
+        if stamp is not None and packet.time_base is not None:
+            stamp_s = float(stamp * packet.time_base)
+            shift_s = self.timeline.offset_s(stamp_s if is_stamped else now_s, now_s)
+            shift_s += 0.0 if is_stamped else now_s - stamp_s
         pictures = self._pictures(packet, connection)
-        if self.record is not None and packet.size:
-            self.record.put(packet, self.timeline)
+        if self.record is not None and packet.size and shift_s is not None:
+            self.record.put(packet, shift_s)
         for picture in pictures:
             connection.pictures += 1
             time_s = self.timeline.time_s(picture.time if is_stamped else None, now_s)

@@ -6,7 +6,6 @@ import signal
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
 from typing import Protocol
 
 from mtm_audit.decoding.settings import DecodeSettings
@@ -80,7 +79,8 @@ class JudgeBeside:
             1, multiprocessing.get_context("spawn"), _prepare, (key, settings)
         )
         self._pool = self._start()
-        self._future: Future[Judged] | None = self._pool.submit(_warm)  # type: ignore[arg-type]
+        # The process starts, and loads what judging needs, before there is anything to judge.
+        self._future: Future[Judged | None] | None = self._pool.submit(_nothing)
         self._failures = 0
 
     @property
@@ -89,8 +89,12 @@ class JudgeBeside:
         return self._future is not None
 
     def begin(self, look: Look, seen: Seen) -> None:
-        """Hand the look over."""
-        self._future = self._pool.submit(_judge_there, look, seen)
+        """Hand the look over, to a new process where the last one is gone."""
+        try:
+            self._future = self._pool.submit(_judge_there, look, seen)
+        except BrokenProcessPool:
+            self._pool = self._start()
+            self._future = self._pool.submit(_judge_there, look, seen)
 
     def finished(self) -> Judged | None:
         """What the look gave; a look whose process was ended from outside gives nothing.
@@ -112,13 +116,12 @@ class JudgeBeside:
             self._pool = self._start()
             return None
         self._failures = 0
-        return judged if isinstance(judged, Judged) else None
+        return judged
 
     def wait(self) -> None:
         """Return when the look has been judged."""
         if self._future is not None:
-            with suppress(BrokenProcessPool):
-                self._future.exception()
+            self._future.exception()
 
     def close(self) -> None:
         """End the process, whatever it is at."""
@@ -141,11 +144,11 @@ def _prepare(key: Key, settings: DecodeSettings) -> None:
     os.nice(_NICENESS)
 
 
-def _warm() -> None:
-    """Make the process start, and load what judging needs, before there is anything to judge."""
+def _nothing() -> Judged | None:
+    return None
 
 
-def _judge_there(look: Look, seen: Seen) -> Judged:
+def _judge_there(look: Look, seen: Seen) -> Judged | None:
     assert _key is not None
     assert _settings is not None
     return judge(look, seen, _key, _settings)

@@ -1,12 +1,13 @@
 """Keeping what was watched, so that it can be decoded: the film as it came, or one table of poses a body."""
 
+import math
 import re
+from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self, TextIO
 
 from mtm_audit.live.events import Pose
-from mtm_audit.live.timeline import Timeline
 from mtm_onboard.protocol.errors import MtmError
 
 if TYPE_CHECKING:
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from av.packet import Packet
     from av.video.stream import VideoStream
 
+# Finer than any camera's own, which may be a whole twenty-fifth of a second.
+_TICK = Fraction(1, 90_000)
 _HEADER = "time_s,x,y,yaw\n"
 
 
@@ -38,7 +41,7 @@ class FilmRecord:
         self._output: OutputContainer | None = None
         self._stream: VideoStream | None = None
         self._coding: tuple[object, ...] = ()
-        self._last_s = float("-inf")
+        self._last = -math.inf
         self.files: list[Path] = []
 
     def __enter__(self) -> Self:
@@ -49,21 +52,19 @@ class FilmRecord:
     ) -> None:
         self.close()
 
-    def put(self, packet: "Packet[VideoStream]", timeline: Timeline) -> None:
-        """Write a packet of the connection that `timeline` is at; those from before its first instant are left out."""
-        offset_s = timeline.current_offset_s
-        if offset_s is None or packet.dts is None or packet.pts is None or packet.time_base is None:
+    def put(self, packet: "Packet[VideoStream]", shift_s: float) -> None:
+        """Write a packet, its times moved by `shift_s`; one without times is left out."""
+        if packet.dts is None or packet.pts is None or packet.time_base is None:
             return
         self._begin_file_for(packet)
         assert self._output is not None
         assert self._stream is not None
-        base = float(packet.time_base)
-        ahead = round(offset_s / base)
+        dts, pts = (round((stamp * packet.time_base + Fraction(shift_s)) / _TICK) for stamp in (packet.dts, packet.pts))
         # After a gap decoding times may reach back before it, and have to rise.
-        if (packet.dts + ahead) * base <= self._last_s:
+        if dts <= self._last:
             return
-        self._last_s = (packet.dts + ahead) * base
-        packet.dts, packet.pts = packet.dts + ahead, packet.pts + ahead
+        self._last = dts
+        packet.time_base, packet.dts, packet.pts = _TICK, dts, pts
         packet.stream = self._stream
         try:
             self._output.mux(packet)
@@ -91,7 +92,7 @@ class FilmRecord:
             self._stream = self._output.add_stream_from_template(stream)
         except (av.FFmpegError, OSError, ValueError) as error:
             raise MtmError(f"what comes cannot be written to {self.files[-1]} ({error}); leave --record out") from error
-        self._coding, self._last_s = coding, float("-inf")
+        self._coding, self._last = coding, -math.inf
 
 
 class PoseRecord:

@@ -21,11 +21,6 @@ class Timeline:
     _last_stamp_s: float = -math.inf
     _last_s: float = -math.inf
 
-    @property
-    def current_offset_s(self) -> float | None:
-        """What is added to the stamps of this connection; None before its first one."""
-        return self._offset_s
-
     def begin_connection(self) -> None:
         """What comes next has stamps of a new beginning; after a gap it is as late as it arrives."""
         if self.is_live:

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 import av
+import cv2
 import numpy as np
 import pytest
 
@@ -183,3 +184,38 @@ def test_a_film_that_grows_is_read_to_its_end(filmed, tmp_path):
     frames = [event for event in FilmSource(grown, "gray", patience_s=0.3, sleep=grow).events()
               if isinstance(event, Frame)]  # fmt: skip
     assert len(frames) == len(list(read_frames(filmed)))
+
+
+def test_pictures_over_http_are_made_when_they_arrive(tmp_path):
+    """Each comes by itself and without a time; the library would say 25 a second."""
+    _, picture = cv2.imencode(".jpg", np.full((48, 64), 90, np.uint8))
+    listener = socket.create_server(("127.0.0.1", 0))
+
+    def serve():
+        with listener:
+            connection, _ = listener.accept()
+            with connection, suppress(OSError):
+                connection.recv(65536)
+                connection.sendall(b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace;boundary=x\r\n\r\n")
+                for _ in range(20):
+                    head = b"--x\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(picture)
+                    connection.sendall(head + picture.tobytes() + b"\r\n")
+
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    url, wall = f"http://127.0.0.1:{listener.getsockname()[1]}/", Wall()
+    found = []
+    with FilmRecord(tmp_path) as record:
+        for event in FilmSource(Address(url, url), "gray", record, clock=wall, sleep=wall.sleep).events():
+            if isinstance(event, Notice) and "has dropped" in event.sentence:
+                break
+            found.append(event)
+    thread.join(5.0)
+    notice, *frames = found
+    assert "states no times" in notice.sentence
+    # This clock goes on by a thirtieth of a second for each.
+    steps_s = np.diff([frame.time_s for frame in frames])
+    assert np.allclose(steps_s, 1.0 / 30.0)
+    assert len(frames) >= 18
+    kept = [frame.time_s for frame in read_frames(record.files[0])]
+    assert np.allclose(np.diff(kept), 1.0 / 30.0, atol=2e-3)
