@@ -39,23 +39,36 @@ def filmed(tmp_path_factory):
     return path
 
 
+def copied(path, target, form, most=None):
+    """The film's first packets as they are, in another container."""
+    with av.open(str(path)) as source, av.open(target, "w", format=form) as output:
+        stream = source.streams.video[0]
+        copy = output.add_stream_from_template(stream)
+        for number, packet in enumerate(source.demux(stream)):
+            if packet.dts is not None and (most is None or number < most):
+                packet.stream = copy
+                output.mux(packet)
+
+
+@pytest.fixture(scope="module")
+def short(filmed):
+    """Its first two seconds."""
+    path = filmed.with_name("short.mp4")
+    copied(filmed, str(path), "mp4", 60)
+    return path
+
+
 def as_stream(path):
     """The film as MPEG-TS, as cameras send it."""
     written = io.BytesIO()
-    with av.open(str(path)) as source, av.open(written, "w", format="mpegts") as output:
-        stream = source.streams.video[0]
-        sent = output.add_stream_from_template(stream)
-        for packet in source.demux(stream):
-            if packet.dts is not None:
-                packet.stream = sent
-                output.mux(packet)
+    copied(path, written, "mpegts")
     return written.getvalue()
 
 
 @pytest.fixture
-def served(filmed):
+def served(short):
     """Send the film to so many who connect, one after the other; gives the address."""
-    data, threads = as_stream(filmed), []
+    data, threads = as_stream(short), []
 
     def serve(listener, times):
         with listener:
@@ -92,14 +105,14 @@ class Wall:
         self.slept.append(pause_s)
 
 
-def test_a_stream_shows_the_film_s_pictures_at_its_times(filmed, served):
+def test_a_stream_shows_the_film_s_pictures_at_its_times(short, served):
     wall = Wall()
     frames = []
     for event in FilmSource(served(), "gray", clock=wall, sleep=wall.sleep).events():
         if isinstance(event, Notice):
             break
         frames.append(event)
-    wanted = list(read_frames(filmed))
+    wanted = list(read_frames(short))
     assert len(frames) == len(wanted)
     shifts_s = [frame.time_s - one.time_s for frame, one in zip(frames, wanted, strict=True)]
     assert np.ptp(shifts_s) < 1e-3
@@ -164,16 +177,9 @@ def test_a_watched_film_decodes_and_what_was_kept_does_too(filmed, tmp_path):
     assert np.ptp(kept.times_s[:count] - whole.times_s[:count]) < 2e-3
 
 
-def test_a_film_that_grows_is_read_to_its_end(filmed, tmp_path):
-    whole = tmp_path / "whole.mkv"
-    with av.open(str(filmed)) as source, av.open(str(whole), "w") as output:
-        stream = source.streams.video[0]
-        copied = output.add_stream_from_template(stream)
-        for packet in source.demux(stream):
-            if packet.dts is not None:
-                packet.stream = copied
-                output.mux(packet)
-    data, grown = whole.read_bytes(), tmp_path / "grown.mkv"
+def test_a_film_that_grows_is_read_to_its_end(short, tmp_path):
+    copied(short, str(tmp_path / "whole.mkv"), "matroska")
+    data, grown = (tmp_path / "whole.mkv").read_bytes(), tmp_path / "grown.mkv"
     grown.write_bytes(data[: len(data) // 3])
 
     def grow(pause_s):
@@ -183,7 +189,7 @@ def test_a_film_that_grows_is_read_to_its_end(filmed, tmp_path):
 
     frames = [event for event in FilmSource(grown, "gray", patience_s=0.3, sleep=grow).events()
               if isinstance(event, Frame)]  # fmt: skip
-    assert len(frames) == len(list(read_frames(filmed)))
+    assert len(frames) == len(list(read_frames(short)))
 
 
 def test_pictures_over_http_are_made_when_they_arrive(tmp_path):

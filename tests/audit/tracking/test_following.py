@@ -84,6 +84,12 @@ def test_a_tracker_that_needs_the_end_is_refused():
         following("arms:red,blue")
 
 
+@pytest.fixture(scope="module")
+def shaken():
+    """What followed a camera that shakes, whole."""
+    return shaken_and_followed(None)
+
+
 def shaken_and_followed(forgotten_s):
     followed, seen = following("aruco"), BackgroundFollower()
     for frame in film(room(), 6.0, size=45):
@@ -95,26 +101,25 @@ def shaken_and_followed(forgotten_s):
     return followed, seen
 
 
-def test_the_camera_s_motion_is_taken_out_of_a_part_as_of_a_film():
-    followed, seen = shaken_and_followed(None)
+def test_the_camera_s_motion_is_taken_out_of_a_part_as_of_a_film(shaken):
+    followed, seen = shaken
     tracks = without_camera(followed.tracks(), seen.until(np.inf))
     whole = stabilised_tracks(tracker("aruco"), film(room(), 6.0, size=45))
     assert all(is_same(*pair) for pair in zip(tracks, whole, strict=True))
 
 
-def test_it_is_taken_out_after_the_beginning_was_forgotten():
+def test_it_is_taken_out_after_the_beginning_was_forgotten(shaken):
     followed, seen = shaken_and_followed(0.5)
     (track,) = without_camera(followed.tracks(), seen.until(np.inf))
     assert len(track.times_s) == 30
-    whole, _ = shaken_and_followed(None)
     truth = np.array([robot_place(number) for number in range(15, 45)])
     truth[:, 1] = 299 - truth[:, 1]
     assert np.std(track.positions - truth - (track.positions - truth).mean(axis=0)) < 0.2
-    assert off_px(whole.tracks()[0]) > 3
+    assert off_px(shaken[0].tracks()[0]) > 3
 
 
-def test_until_an_instant_the_background_goes_with_the_tracks():
-    _, seen = shaken_and_followed(None)
+def test_until_an_instant_the_background_goes_with_the_tracks(shaken):
+    _, seen = shaken
     part = seen.until(0.5)
     assert len(part.times_s) == 15
     assert max(look.row for look in part.looks) == 14
