@@ -38,7 +38,7 @@ from mtm_onboard.protocol.errors import command_line_values
 from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.output_file import check_outputs
 
-_PIPE_COLUMNS = 140
+PIPE_COLUMNS = 140
 EXIT_CODES = {"decoded": 0, "absent": 3, "inconclusive": 4}
 
 
@@ -248,7 +248,7 @@ def _publish(
         return json_report(recording, decoding, warnings, basis)
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
     # What users name is printed as it is: a track may be called body[left].
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS, markup=False, emoji=False)
+    console = Console(width=None if sys.stdout.isatty() else PIPE_COLUMNS, markup=False, emoji=False)
     with console.capture() as captured:
         print_report(console, recording, decoding, warnings, basis)
     return captured.get()
