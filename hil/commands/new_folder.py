@@ -1,8 +1,8 @@
 """New folders that appear complete or not at all."""
 
 import os
+import secrets
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,18 +24,24 @@ def new_folder(path: Path) -> Iterator[Path]:
     Raises MtmError when `path` exists or cannot be made.
     """
     check_new(path)
+    # Named before it is made, so that a request to end between the two leaves nothing either.
+    temporary = path.parent / f".{path.name}-{secrets.token_hex(4)}"
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{path.name}-", dir=path.parent))
-    except OSError as error:
-        raise MtmError(f"cannot make {path}: {error.strerror}; choose a folder that is writable") from error
-    try:
+        _make(temporary, path)
         yield temporary
         temporary.chmod(0o755)
         _take_place(temporary, path)
     except BaseException:
         shutil.rmtree(temporary, ignore_errors=True)
         raise
+
+
+def _make(temporary: Path, path: Path) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.mkdir(mode=0o700)
+    except OSError as error:
+        raise MtmError(f"cannot make {path}: {error.strerror}; choose a folder that is writable") from error
 
 
 def _take_place(temporary: Path, path: Path) -> None:

@@ -14,6 +14,7 @@ from hil.experiments.detectors.calibrate import SLIPS_MPS
 from hil.experiments.detectors.paper_figures import MARGINS
 from hil.fleet.lockstep import run_lockstep
 from hil.fleet.programs import program
+from hil.plants.mecanum import PLANT_FILE
 from hil.sensors.cameras import CAMERAS
 from hil.worlds.robomaster import tagged_scheme
 from hil.worlds.vehicles import VEHICLES
@@ -247,6 +248,14 @@ def test_calibrating_writes_the_plant_and_prints_candidates(quick_rollouts, tmp_
     output = capsys.readouterr().out
     assert output.count("(75)") == 6 * len(SLIPS_MPS)
     assert len(cells.read_text().splitlines()) == 2 * 6 * len(SLIPS_MPS)
+
+
+def test_calibrating_writes_nothing_into_the_package(quick_rollouts, tmp_path, capsys):
+    before = PLANT_FILE.read_bytes()
+    assert run("calibrate", "-n", 2, "--cells", tmp_path / "cells.jsonl") == 0
+    assert "fits best" in capsys.readouterr().out
+    assert PLANT_FILE.read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["cells.jsonl"]
 
 
 def test_the_paper_s_table_is_printed_and_written(quick_rollouts, tmp_path, capsys):

@@ -228,6 +228,30 @@ def test_a_plan_names_the_scheme_that_it_makes(audit):
     assert (made.name, made.fingerprint) == (name, fingerprint)
 
 
+def test_a_plan_is_written_again_and_over_nothing_else(audit, folder):
+    wanted = (
+        "plan",
+        "lander.csv",
+        *JOB[:2],
+        *JOB[4:],
+        "--like",
+        "lander.key",
+        "--out",
+        "plan.toml",
+        "--plot",
+        "plan.png",
+    )
+    for _ in range(2):
+        assert audit(*wanted)[0] == 0
+    scheme = (folder / "plan.toml").read_text()
+    (folder / "plan.toml").write_text(scheme.partition("\n")[2])
+    code, out, err = audit(*wanted)
+    assert (code, out) == (1, "")
+    assert "plan.toml exists and was not made by mtm-audit plan" in err
+    assert audit(*wanted, "--force")[0] == 0
+    assert (folder / "plan.toml").read_text() == scheme
+
+
 def test_duration_is_in_seconds(audit):
     code, out, _ = audit("duration", "lander.csv", "--key", "lander.key", "--accuracy", "0.9")
     assert code == 0

@@ -28,7 +28,7 @@ def test_a_row_for_each_plant_that_was_named(tmp_path, capsys):
 
 
 def test_a_plant_that_is_not_known_gets_one_sentence(tmp_path, capfd):
-    assert run(*asked(tmp_path, "arm,boat")) == 1
+    assert run(*asked(tmp_path, "arm,boat")) == 2
     error = capfd.readouterr().err
     assert "there is no plant 'boat'" in error
     assert error.count("\n") == 1

@@ -53,7 +53,7 @@ def test_a_track_without_heading_is_left_out_in_the_body_frame(tmp_path, tracks,
     ],
 )
 def test_an_option_that_does_not_fit_gets_one_sentence(tmp_path, tracks, capfd, more, sentence):
-    assert run(*quick(tmp_path, *more)) == 1
+    assert run(*quick(tmp_path, *more)) == (2 if "wide" in more else 1)
     error = capfd.readouterr().err
     assert sentence in error
     assert error.count("\n") == 1

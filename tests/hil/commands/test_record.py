@@ -101,7 +101,7 @@ def test_two_channels_of_one_body_are_played_together(capsys):
 
 
 def test_robots_beyond_the_key_s_bodies_send_nothing(capsys):
-    key(*PLAIN, "--channel", "rover:vx,vy:4:0.1", "--schedule", "fixed")
+    key(*PLAIN[:-1], 1600, "--channel", "rover:vx,vy:4:0.2", "--schedule", "fixed")
     assert record("--message", 7, "--key", "lab.key", "--robots", 3, *QUICK) == 0
     assert sorted(path.stem for path in MOCAP.iterdir()) == ["robot0", "robot1", "rover"]
     code, found = decoded(capsys, "lab.key", "--onset", "1.5")

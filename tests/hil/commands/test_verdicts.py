@@ -35,7 +35,7 @@ def test_sure_goes_on_from_the_cells_that_are_finished(tmp_path, capsys, monkeyp
 
 
 def test_a_name_that_is_not_known_gets_one_sentence(tmp_path, capfd):
-    assert run(*quick(tmp_path, "sure"), "--only", "hovercraft") == 1
+    assert run(*quick(tmp_path, "sure"), "--only", "hovercraft") == 2
     error = capfd.readouterr().err
     assert "there is no 'hovercraft' to measure; choose from: robomaster; " in error
     assert error.count("\n") == 1

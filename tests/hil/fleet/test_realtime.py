@@ -125,7 +125,7 @@ def test_a_program_that_fails_ends_the_run_with_its_own_words(tmp_path):
     settings = short_run(seconds=PATIENCE_S, start_s=3.5)
     (tmp_path / "robot.key").write_text("no key")
     (tmp_path / "robot.key").chmod(0o600)
-    with pytest.raises(MtmError, match="mtm-onboard of robot[0-3] ended with code 1.*robot.key is not valid TOML"):
+    with pytest.raises(MtmError, match="mtm-onboard of robot[0-3] ended with code 1.*robot.key is no key file"):
         run_realtime(replace(settings, symbols=None), tmp_path / "robot.key", tmp_path)
 
 
