@@ -82,7 +82,8 @@ def decode_together(recordings: Sequence[Recorded], key: Key, progress: Progress
         )
         posteriors, symbols = symbols_of_frame(frames[-1])
         together = replace(together, frames=frames, posteriors=posteriors, symbols=symbols)
-    return judged(together, base.settings.threshold), read.index(first)
+    number = next(row for row, each in enumerate(read) if each is first)
+    return judged(together, base.settings.threshold), number
 
 
 def _read(recorded: Recorded, key: Key, progress: Progress | None) -> _Read:
