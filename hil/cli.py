@@ -6,16 +6,20 @@ from typing import Annotated
 
 import typer
 
+from hil.commands.clusters import takes_scheduler
 from hil.commands.codecs_cli import codecs
 from hil.commands.experiments_cli import EXPERIMENTS
 from hil.commands.options import (
     KeyFile,
+    MessageBytes,
     MessageNumber,
+    MessageText,
     NewFolder,
     NoMessage,
     Renderer,
     RendererName,
     WorldSeed,
+    content_of,
     reported_console,
     require_message_or_none,
 )
@@ -75,10 +79,23 @@ def record(
     *,
     out: NewFolder,
     message: MessageNumber = None,
+    text: MessageText = None,
+    hexadecimal: MessageBytes = None,
     no_message: NoMessage = False,
     seconds: Annotated[
-        float, typer.Option(metavar="SECONDS", min=0.1, max=86_400.0, help="Length of the recording.")
-    ] = 26.0,
+        float | None,
+        typer.Option(
+            metavar="SECONDS", min=0.1, max=86_400.0, help="Length of the recording (default: 26, or one message)."
+        ),
+    ] = None,
+    robots: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=1,
+            help="How many robots; those beyond the key's bodies send nothing (default: these, or 4).",
+        ),
+    ] = None,
     key: KeyFile = None,
     wire: Annotated[WireName, typer.Option(help="CAN, plaintext or MAVLink protocol, or no wire.")] = WireName.CAN,
     seed: WorldSeed = 0,
@@ -109,9 +126,9 @@ def record(
         bool, typer.Option("--realtime", help="Run the onboard programs in processes of their own, on real ports.")
     ] = False,
 ) -> None:
-    """Record four simulated robots: motion capture, video, and what was sent."""
-    require_message_or_none(message, no_message)
+    """Record simulated robots that play any key: motion capture, video, and what was sent."""
     with reported_console() as console:
+        content = content_of(message, text, hexadecimal, no_message)
         from math import radians
 
         from hil.commands.record import RecordOptions
@@ -125,7 +142,7 @@ def record(
             RecordOptions(
                 out=out,
                 seconds=seconds,
-                message=message,
+                content=content,
                 key=key,
                 wire=wire.value,
                 seed=seed,
@@ -135,6 +152,7 @@ def record(
                 motion=motion if moves else None,
                 floor=floor.value,
                 plant=plant,
+                robots=robots,
             ),
             console,
         )
@@ -181,6 +199,10 @@ for _experiment in EXPERIMENTS:
 app.add_typer(paper, name="paper")
 app.add_typer(verdicts, name="verdicts")
 app.add_typer(codecs, name="codecs")
+for _app in (app, paper, verdicts, codecs):
+    for _command in _app.registered_commands:
+        if _command.callback is not None:
+            _command.callback = takes_scheduler(_command.callback)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -22,8 +22,9 @@ app = typer.Typer(
     no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, context_settings=HELP_OPTIONS,
 )  # fmt: skip
 
+_TRACKER = "aruco"
 _TRACKER_HELP = (
-    "How to find robots in a video: aruco or aruco:6x6_250, colour:NAME,..., centroid:COLOUR, brightness or "
+    "How to find robots in a video: aruco (default) or aruco:6x6_250, colour:NAME,..., centroid:COLOUR, brightness or "
     "brightness:X0,Y0,X1,Y1, arms:INNER,OUTER, football, or flow:X0,Y0,X1,Y1 (pixels from the upper left corner); "
     "see docs/filming.md."
 )
@@ -80,7 +81,7 @@ def decode(
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
-    tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
+    tracker: Annotated[str | None, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = None,
     reference: Annotated[
         str,
         typer.Option(
@@ -198,17 +199,22 @@ def decode(
             revoked=RevocationList() if revoked is None else load_revocations(revoked),
         )  # fmt: skip
         reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        given = _given({
+            "--tracker": tracker, "--reference": reference, "--frame-rate": frame_rate, "--topic": topic,
+            "--body": body, "--unit": unit, "--time-unit": time_unit, "--up": up, "--arrival-times": arrival_times,
+            "--at": at,
+        })  # fmt: skip
         played = None if search_speed else 1.0 if speed is None else speed
         inputs = {
             "key": key, "anchor": anchor, "disclosed key": disclosed, "profile": profile, "revocations": revoked,
         }  # fmt: skip
         code = run_decode(
             DecodeOptions(
-                paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker,
+                paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker or _TRACKER,
                 reference=_names(reference), settings=settings, as_json=as_json, plot=plot, explain=explain,
                 reading=reading, frame_rate_hz=frame_rate, speed=played, overlay=overlay_files(overlay, sheet),
                 report=None if report is None else requested(report, context.find_root().obj, inputs), force=force,
-                together=together, each_at=tuple(began) if together else (),
+                together=together, each_at=tuple(began) if together else (), given=given,
             )
         )  # fmt: skip
     raise typer.Exit(code)
@@ -249,6 +255,85 @@ def look(
             LookOptions(
                 paths=tuple(paths), picture=picture, as_json=as_json, frame_rate_hz=frame_rate, reading=reading,
                 force=force,
+            )
+        )  # fmt: skip
+    raise typer.Exit(code)
+
+
+@app.command()
+def watch(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="SOURCE",
+            help="A camera (/dev/video0), a stream (rtsp://, http://, tcp://), a file that grows, or poses at "
+            "udp://HOST:PORT.",
+        ),
+    ],
+    key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
+    tracker: Annotated[
+        str, typer.Option(metavar="NAME", help="How to find robots: aruco[:6x6_250], colour:NAME,... or centroid:NAME.")
+    ] = "aruco",
+    reference: Annotated[
+        str,
+        typer.Option(
+            metavar="TRACK,...", help="Tracks that stand still, such as markers on the floor (default: found)."
+        ),
+    ] = "",
+    assign: Annotated[
+        list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
+    ] = None,
+    threshold: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="How often a message that is called decoded may be wrong.")
+    ] = 1e-4,
+    seconds: Annotated[
+        float | None, typer.Option(metavar="N", min=0.1, help="End after so long (default: at the verdict alone).")
+    ] = None,
+    page: Annotated[
+        int | None,
+        typer.Option(
+            metavar="PORT", min=0, max=65_535, help="Serve a page to browsers on this machine; 0 takes a free port."
+        ),
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Keep what was seen in a new folder, which decode reads.")
+    ] = None,
+    profile: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="What mtm-audit profile learnt about this type of robot.")
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", help="When a file was begun (2026-01-31T12:00:00Z), for a rolling schedule."),
+    ] = None,
+    at_error: Annotated[
+        float,
+        typer.Option(min=0.0, max=60.0, metavar="SECONDS", help="How far this machine's clock and the source are off."),
+    ] = 10.0,
+    revoked: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Key files no longer trusted, as mtm-onboard revoke lists them.")
+    ] = None,
+) -> None:
+    """Watch a camera, a stream or poses, and stop when a message is decoded (docs/watch.md).
+
+    Exit codes: 0 decoded, 3 no message of this key, 4 inconclusive, 1 error, 2 usage. Ctrl-C ends with the best answer
+    so far.
+    """  # fmt: skip
+    pairs, at_unix_s = _pairs(assign or []), _unix_s(at)
+    with reported("mtm-audit", "nothing was decoded"):
+        from mtm_audit.commands.opened_key import KeySource
+        from mtm_audit.commands.watch import WatchOptions, run_watch
+        from mtm_audit.decoding.settings import DecodeSettings
+        from mtm_audit.detectors.matched.profile import load_profile
+        from mtm_onboard.protocol.revocation import RevocationList, load_revocations
+
+        settings = DecodeSettings(
+            threshold=threshold, assignment=pairs, profile=None if profile is None else load_profile(profile),
+            revoked=RevocationList() if revoked is None else load_revocations(revoked),
+        )  # fmt: skip
+        code = run_watch(
+            WatchOptions(
+                source=source, key=KeySource(key), tracker=tracker, reference=_names(reference), settings=settings,
+                at_unix_s=at_unix_s, at_error_s=at_error, seconds=seconds, page=page, record=record,
             )
         )  # fmt: skip
     raise typer.Exit(code)
@@ -352,7 +437,7 @@ def learn_profile(
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
-    tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
+    tracker: Annotated[str | None, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = None,
     reference: Annotated[
         str,
         typer.Option(
@@ -380,7 +465,15 @@ def learn_profile(
 
         settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
         reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
-        run_profile(ProfileOptions(tuple(paths), key, out, tracker, _names(reference), settings, reading, force))
+        given = _given({
+            "--tracker": tracker, "--reference": reference, "--topic": topic, "--body": body, "--unit": unit,
+            "--time-unit": time_unit, "--up": up, "--arrival-times": arrival_times,
+        })  # fmt: skip
+        run_profile(
+            ProfileOptions(
+                tuple(paths), key, out, tracker or _TRACKER, _names(reference), settings, reading, force, given
+            )
+        )
 
 
 @app.command("journal")
@@ -419,6 +512,9 @@ def plan(
     measured_only: Annotated[
         bool, typer.Option("--measured-only", help="Search measured points alone, as the paper does.")
     ] = False,
+    sure: Annotated[
+        bool, typer.Option("--sure", help="Plan so that the interval's lower end meets the target.")
+    ] = False,
     check: Annotated[
         Path | None, typer.Option(metavar="TABLE.csv", help="Compare with accuracies of other recordings.")
     ] = None,
@@ -441,7 +537,7 @@ def plan(
         from mtm_audit.commands.plan import PlanOptions, run_plan
         from mtm_audit.planning.plan import Problem
 
-        problem = Problem(bits, accuracy, tuple(alphabet) if alphabet else None, measured_only)
+        problem = Problem(bits, accuracy, tuple(alphabet) if alphabet else None, measured_only, sure)
         chosen = None if strategy is None else strategy.value
         code = run_plan(PlanOptions(table, problem, rate, like, chosen, check, plot, out, force))
     raise typer.Exit(code)
@@ -494,6 +590,11 @@ def _unix_s(text: str | None) -> float | None:
             f"{text!r} is no date and time; write it like 2026-01-31T12:00:00Z", param_hint="--at"
         ) from None
     return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()
+
+
+def _given(options: Mapping[str, object]) -> frozenset[str]:
+    """The names of those that were given, which are not None, empty or False."""
+    return frozenset(name for name, value in options.items() if value)
 
 
 def _names(text: str) -> tuple[str, ...]:

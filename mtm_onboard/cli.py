@@ -58,9 +58,12 @@ def parser_of() -> Parser:
 
 class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        from mtm_onboard.protocol.installing import program_version
+        from importlib.metadata import PackageNotFoundError, version
 
-        print(f"mtm-onboard {program_version()}")
+        try:
+            print(f"mtm-onboard {version('messages-through-motion')}")
+        except PackageNotFoundError:
+            print("mtm-onboard (not installed, so without a version)")
         parser.exit()
 
 

@@ -368,6 +368,38 @@ def forgeries(
             raise typer.Exit(1)
 
 
+def attacks(
+    *,
+    rollouts: Annotated[
+        int, typer.Option("-n", min=1, help="Rollouts at each level of the paper's tables; others take a part.")
+    ] = 50,
+    only: Annotated[list[str] | None, typer.Option(metavar="NAME", help="This attack; may be repeated.")] = None,
+    seed: FirstSeed = 40_000,
+    workers: Workers = None,
+    out: Annotated[Path | None, typer.Option(help="A folder to write attacks_NAME.csv in as well.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="A picture to draw: a panel for each attack.")] = None,
+    cells: Cells = CELLS_FOLDER / "attacks.jsonl",
+) -> None:
+    """Suppress, forge and spy on messages: the paper's two tables of attacks, and a curve for each that it leaves open.
+
+    Stop it at any time: what is finished is kept, and the next run goes on.
+    """
+    with reported_console() as console:
+        from hil.commands.attacks import AttackOptions
+        from hil.commands.attacks import attacks as run
+
+        options = AttackOptions(
+            names=tuple(only or ()),
+            rollouts=rollouts,
+            first_seed=seed,
+            workers=workers,
+            out=out,
+            plot=plot,
+            cells=cells,
+        )
+        run(options, console)
+
+
 def endurance(
     hours: Annotated[float, typer.Option(metavar="HOURS", min=0.0, help="Simulated hours.")] = 24.0,
     checkpoints: Annotated[
@@ -389,5 +421,5 @@ def endurance(
 # In the order in which --help lists them.
 EXPERIMENTS: tuple[Callable[..., None], ...] = (
     calibrate, bench, cameras, false_alarms, messages, frames, shim, robustness, sweep, real, identify, faults, fuzz,
-    forgeries, endurance,
+    forgeries, attacks, endurance,
 )  # fmt: skip

@@ -13,6 +13,8 @@ from mtm_audit.commands.errors import reported
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from mtm_onboard.runtime.message import Content
+
 
 class Renderer(StrEnum):
     """Who draws the pictures of a simulated world."""
@@ -23,6 +25,12 @@ class Renderer(StrEnum):
 
 # A recording: `record` and `film`.
 NewFolder = Annotated[Path, typer.Option(metavar="FOLDER", help="The folder to make; it must not exist.")]
+MessageText = Annotated[
+    str | None, typer.Option("--text", metavar="TEXT", help="The message as text, for keys whose payload is text.")
+]
+MessageBytes = Annotated[
+    str | None, typer.Option("--hex", metavar="HEX", help="The message as bytes, for keys whose payload is bytes.")
+]
 MessageNumber = Annotated[int | None, typer.Option(metavar="N", help="The message as a number.")]
 NoMessage = Annotated[bool, typer.Option("--no-message", help="Move without a message.")]
 KeyFile = Annotated[
@@ -45,6 +53,21 @@ Cells = Annotated[
 CELLS_FOLDER = Path("out/cells")
 
 
+def content_of(number: int | None, text: str | None, hexadecimal: str | None, no_message: bool) -> "Content | None":
+    """What is to be sent, None for nothing; raises BadParameter unless exactly one of these is asked for."""
+    given = {"number": number, "text": text, "hex": hexadecimal}
+    asked = {kind: value for kind, value in given.items() if value is not None}
+    if len(asked) + no_message != 1:
+        raise typer.BadParameter("give one of --message N, --text TEXT, --hex HEX and --no-message")
+    if no_message:
+        return None
+    from mtm_onboard.protocol.errors import command_line_values
+    from mtm_onboard.runtime.message import content_from_table
+
+    with command_line_values():
+        return content_from_table(asked)
+
+
 def require_message_or_none(message: int | None, no_message: bool) -> None:
     """Raise BadParameter unless exactly one of a message and none at all is asked for."""
     if (message is None) != no_message:
@@ -63,4 +86,5 @@ def reported_console(command: str = "mtm-hil", *outputs: Path | None, force: boo
         from mtm_onboard.protocol.output_file import check_outputs
 
         check_outputs(command, *outputs, force=force)
-        yield Console()
+        # What users name may look like markup.
+        yield Console(markup=False)

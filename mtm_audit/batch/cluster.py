@@ -1,5 +1,6 @@
 """A function of many arguments on many machines, by a Dask cluster whose scheduler is named by its address."""
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -60,10 +61,24 @@ def _connected(scheduler: str) -> Iterator["Client"]:
             f"no Dask scheduler answers at {scheduler}; start one with `dask scheduler`, and name the address that it "
             "prints, such as tcp://192.168.0.2:8786"
         ) from error
-    with client:
+    with _silent(), client:
         if not client.scheduler_info()["workers"]:
             raise MtmError(f"the scheduler at {scheduler} has no workers; start some with `dask worker {scheduler}`")
         yield client
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Dask logs what is raised as well, with tracebacks on standard error."""
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
+    former = {name: logging.getLogger(name).level for name in names}
+    try:
+        for name in names:
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+        yield
+    finally:
+        for name, level in former.items():
+            logging.getLogger(name).setLevel(level)
 
 
 def _result(future: Any, scheduler: str) -> Any:

@@ -70,8 +70,8 @@ def _of_files(paths: Sequence[Path]) -> list[Found]:
             found.append((place, Found(str(path), None, str(error))))
     places = {path: place for place, path in reversed(list(enumerate(paths)))}
     found += [(min(places[path] for path in film), _film(film)) for film in chapters_of(films)]
-    for folder, group in pictures.items():
-        film = Found(str(folder), Source(tuple(group), "video"))
+    for group in pictures.values():
+        film = Found(str(group[0]), Source(tuple(group), "video"))
         single = f"{group[0]} is a single picture; name a folder of them, or a video"
         found.append((places[group[0]], film if len(group) > 1 else Found(str(group[0]), None, single)))
     return [item for _, item in sorted(found, key=lambda entry: entry[0])]

@@ -17,7 +17,7 @@ R = TypeVar("R")
 
 # Numerical libraries read these when they are loaded. Several computing processes with more threads than there are
 # cores slow each other down.
-_SINGLE_THREADED = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+SINGLE_THREADED = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 # What ends a process may have been meant for another, such as when memory is short.
 _TRIES = 2
 
@@ -29,31 +29,37 @@ def in_processes(function: Callable[[T], R], arguments: Sequence[T], count: int)
     Leaving the iterator ends the processes at once.
     """
     waiting = [(place, 1) for place in reversed(range(len(arguments)))]
-    idle: list[_Process] = []
     busy: dict[Connection, tuple[_Process, int, int]] = {}
+
+    def begin(process: _Process) -> None:
+        place, number = waiting.pop()
+        process.begin(arguments[place])
+        busy[process.connection] = process, place, number
+
     try:
-        while waiting or busy:
-            while waiting and len(busy) < count:
-                place, number = waiting.pop()
-                process = idle.pop() if idle else _started(function)
-                process.begin(arguments[place])
-                busy[process.connection] = process, place, number
+        for _ in range(min(count, len(arguments))):
+            begin(_started(function))
+        while busy:
             for connection in wait(list(busy)):
                 assert isinstance(connection, Connection)
-                process, place, number = busy.pop(connection)
+                process, place, number = busy[connection]
                 try:
-                    result = process.result()
+                    result: R | Lost = process.result()
                 except EOFError:
+                    result = Lost()
+                del busy[connection]
+                again = isinstance(result, Lost) and number < _TRIES
+                if again:
+                    waiting.append((place, number + 1))
+                # Before the result is taken, which may take a while, so that the process need not wait for that.
+                if isinstance(result, Lost) or not waiting:
                     process.end()
-                    if number < _TRIES:
-                        waiting.append((place, number + 1))
-                    else:
-                        yield place, Lost()
-                    continue
-                idle.append(process)
-                yield place, result
+                if waiting:
+                    begin(_started(function) if isinstance(result, Lost) else process)
+                if not again:
+                    yield place, result
     finally:
-        for process in [*idle, *(process for process, *_ in busy.values())]:
+        for process, *_ in busy.values():
             process.end()
 
 
@@ -117,14 +123,23 @@ def _single_threaded() -> None:
 
 @contextmanager
 def _quiet_children() -> Iterator[None]:
-    """Start processes with one numerical thread that leave interrupts from the keyboard to this one, from the start."""
-    former = {name: os.environ.get(name) for name in _SINGLE_THREADED}
-    os.environ.update(_SINGLE_THREADED)
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    """Start processes that compute in one thread and leave interrupts from the keyboard to this one, from the start."""
+    with single_threaded_children():
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+@contextmanager
+def single_threaded_children() -> Iterator[None]:
+    """Processes that start in the block have one numerical thread each."""
+    former = {name: os.environ.get(name) for name in SINGLE_THREADED}
+    os.environ.update(SINGLE_THREADED)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         for name, value in former.items():
             if value is None:
                 del os.environ[name]

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 from mtm_audit.batch.content import Content, content_of
 from mtm_audit.batch.fingerprint import decoding_fingerprint, reading_fingerprint
@@ -60,26 +60,38 @@ def read_rows(work: Work) -> tuple[Row, ...] | None:
 
 
 def _recording(plan: Plan, source: Source, content: Content) -> Recording:
-    """The recording with its tracks, from the cache where they are there."""
-    cache, name = TrackCache(plan.cache or usual_folder()), _cache_name(plan, source, content)
-    recording = cache.find(name, source.files, source.kind)
-    if recording is None:
-        recording = read_recording(
-            source.files,
-            source.kind,
-            plan.tracker,
-            options=plan.reading,
-            frame_rate_hz=plan.frame_rate_hz,
-            reference=plan.reference,
-        )
-        cache.keep(name, recording)
+    """The recording with its tracks; those of a film from the cache where they are there.
+
+    Logs are read each time, which takes little, and some have their times in files beside them.
+    """
+    if source.kind != "video":
+        recording = _read(plan, source)
+    else:
+        cache, name = TrackCache(plan.cache or usual_folder()), _cache_name(plan, source, content)
+        kept = cache.find(name, source.files)
+        recording = _read(plan, source) if kept is None else kept
+        if kept is None:
+            cache.keep(name, recording)
     return replace(recording, warnings=(*source.warnings, *recording.warnings))
 
 
+def _read(plan: Plan, source: Source) -> Recording:
+    return read_recording(
+        source.files,
+        source.kind,
+        plan.tracker,
+        options=plan.reading,
+        frame_rate_hz=plan.frame_rate_hz,
+        reference=plan.reference,
+    )
+
+
 def _cache_name(plan: Plan, source: Source, content: Content) -> str:
-    """What tracks depend on: files, which robots and times are named after, how they are read, and what reads them."""
-    asked: object = asdict(plan.reading)
-    if source.kind == "video":
-        asked = [plan.tracker, plan.reference, plan.frame_rate_hz]
-    text = json.dumps([reading_fingerprint(), source.kind, asked, content.files], sort_keys=True)
+    """What tracks of a film depend on: its files, whose names may be times, how they are tracked, and what tracks them.
+
+    Where a film is several files, warnings may name their folder, so that a copy elsewhere is another one.
+    """
+    folder = str(source.files[0].parent) if len(source.files) > 1 else ""
+    asked = [plan.tracker, plan.reference, plan.frame_rate_hz, folder]
+    text = json.dumps([reading_fingerprint(), asked, content.files], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()

@@ -1,5 +1,6 @@
 """A whole batch: what is still to do, doing it here or on a cluster, and the table of all."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from mtm_audit.batch.reading import Work, read_rows
 from mtm_audit.batch.results import ResultsFile, Rows
 from mtm_audit.batch.row import UNREADABLE, printable
 from mtm_audit.batch.told import unreadable_row
+from mtm_onboard.protocol.errors import MtmError
 
 _LOST = (
     "each process that read it was ended from outside or crashed, perhaps for want of memory; decode it alone to see "
@@ -49,6 +51,9 @@ def run_batch(
     and when a worker cannot work at all.
     """
     names = [printable(item.name) for item in found]
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
+    if twice is not None:
+        raise MtmError(f"two recordings would both be called {twice} in the table; rename one")
     with ResultsFile(out, plan.run, names, force=force) as results:
         todo = [Work(plan, item, _known(results.kept, name)) for item, name in zip(found, names, strict=True)]
         kept = 0

@@ -1,4 +1,4 @@
-"""Tracks of recordings that were read before, in a folder, so that another key does not read the film again.
+"""Tracks of films that were read before, in a folder, so that another key does not read the film again.
 
 An entry is found by what the files hold, their names, how they are read, and the code that reads them. It begins with
 the SHA-256 of its rest, so that a damaged one is noticed and made anew, and it appears whole or not at all. What was
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from mtm_audit.model.recorded_at import RecordedAt
-from mtm_audit.model.recording import Kind, Recording
+from mtm_audit.model.recording import Recording
 from mtm_audit.model.track import Track
 from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
@@ -51,8 +51,8 @@ class TrackCache:
         if not os.access(self.folder, os.W_OK | os.X_OK):
             raise MtmError(f"the folder {self.folder} is not yours to write; name another with --cache")
 
-    def find(self, name: str, files: Sequence[Path], kind: Kind) -> Recording | None:
-        """The recording of that name as it was read, with `files` for its paths; None when it has to be read."""
+    def find(self, name: str, files: Sequence[Path]) -> Recording | None:
+        """The film of that name as it was read, with `files` for its paths; None when it has to be read."""
         path = self._path(name)
         try:
             entry = path.read_bytes()
@@ -64,10 +64,10 @@ class TrackCache:
         # The oldest go first, by when they were used.
         with suppress(OSError):
             os.utime(path)
-        return _unpacked(content, files, kind)
+        return _unpacked(content, files)
 
     def keep(self, name: str, recording: Recording) -> None:
-        """Store a recording under that name, and let go of what was used longest ago."""
+        """Store a film under that name, and let go of what was used longest ago."""
         content = _packed(recording)
         with suppress(OSError, MtmError):
             self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -115,7 +115,7 @@ def _plain(number: float | None) -> float | None:
     return None if number is None else float(number)
 
 
-def _unpacked(content: bytes, files: Sequence[Path], kind: Kind) -> Recording:
+def _unpacked(content: bytes, files: Sequence[Path]) -> Recording:
     with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
         described = json.loads(arrays["described"].tobytes())
         tracks = tuple(
@@ -133,7 +133,7 @@ def _unpacked(content: bytes, files: Sequence[Path], kind: Kind) -> Recording:
         )
     warnings = tuple(_with_places(warning, files) for warning in described["warnings"])
     at = None if described["at"] is None else RecordedAt(*described["at"])
-    return Recording(tuple(files), kind, tracks, warnings, at)
+    return Recording(tuple(files), "video", tracks, warnings, at)
 
 
 def _without_places(warning: str, files: Sequence[Path]) -> str:

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress
 
 from mtm_audit.commands.opened_key import KeySource, OpenedKey, opened_key
 from mtm_audit.commands.several import check_together, run_each
+from mtm_audit.commands.unused import unused_options
 from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.decoding.recorded import decode_recording, recorded_of
 from mtm_audit.decoding.settings import DecodeSettings
@@ -36,7 +38,7 @@ from mtm_onboard.protocol.errors import command_line_values
 from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.output_file import check_outputs
 
-_PIPE_COLUMNS = 140
+PIPE_COLUMNS = 140
 EXIT_CODES = {"decoded": 0, "absent": 3, "inconclusive": 4}
 
 
@@ -46,7 +48,8 @@ class DecodeOptions:
 
     `frame_rate_hz` replaces the times of films; `speed` is how many times as fast the recording is played, None to
     search for it. `overlay` is what to draw over the film; `report` None writes no page. With `together` all recordings
-    show one message; `each_at` says when each was made, empty where the files do.
+    show one message; `each_at` says when each was made, empty where the files do. `given` are the names of options that
+    were given and may not matter, see `unused_options`.
     """
 
     paths: tuple[Path, ...]
@@ -65,6 +68,7 @@ class DecodeOptions:
     overlay: OverlayFiles = field(default_factory=OverlayFiles)
     together: bool = False
     each_at: tuple[RecordedAt, ...] = ()
+    given: frozenset[str] = frozenset()
 
 
 def run_decode(options: DecodeOptions) -> int:
@@ -124,7 +128,9 @@ def _explained(options: DecodeOptions, stages: Sequence[Stage]) -> Iterator[None
         yield
     except StageError as error:
         if options.explain:
-            sys.stderr.write(text_of_stages([*stages, Stage(error.stage, (str(error),), failed=True)]))
+            sys.stderr.write(
+                text_of_stages([*stages, Stage(error.stage, (str(error),), failed=True, says_what_to_do=True)])
+            )
         raise
 
 
@@ -190,7 +196,7 @@ def _recorded(
         frames = film_length(files) if kind == "video" else None
     if kind == "video":
         stages.append(Stage("recording", (f"video {source.name}, {frames or 'an unknown number of'} frames",)))
-    task = progress.add_task(f"tracking {files[0].name}", total=frames, visible=kind == "video")
+    task = progress.add_task(f"tracking {escape(files[0].name)}", total=frames, visible=kind == "video")
     with stage("tracks" if kind == "video" else "recording"):
         recording = read_recording(
             files,
@@ -201,7 +207,8 @@ def _recorded(
             frame_rate_hz=options.frame_rate_hz,
             reference=options.reference,
         )
-        recording = replace(recording, warnings=(*source.warnings, *recording.warnings))
+        unused = unused_options(options.given, kind, opened.key.scheme.schedule)
+        recording = replace(recording, warnings=(*source.warnings, *unused, *recording.warnings))
     progress.remove_task(task)
     stages[1:] = stages_of_recording(recording)
     opened.check_before_public(options.settings.at or recording.at)
@@ -241,7 +248,7 @@ def _publish(
         return json_report(recording, decoding, warnings, basis)
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
     # What users name is printed as it is: a track may be called body[left].
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS, markup=False, emoji=False)
+    console = Console(width=None if sys.stdout.isatty() else PIPE_COLUMNS, markup=False, emoji=False)
     with console.capture() as captured:
         print_report(console, recording, decoding, warnings, basis)
     return captured.get()

@@ -38,7 +38,7 @@ def run_journal(path: Path, *, as_json: bool, plot: Path | None, key: Path | Non
     if as_json:
         sys.stdout.write(json.dumps(summary.as_table(), indent=2, allow_nan=False) + "\n")
     else:
-        console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS)
+        console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS, markup=False)
         console.print(_table(summary), highlight=False)
 
 

@@ -62,10 +62,13 @@ def run_plan(options: PlanOptions) -> int:
         save_scheme(scheme, options.out, (f"{COMMAND}: {headline(found, options.problem, rate_hz)}",))
     print(headline(found, options.problem, rate_hz))
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS)
+    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS, markup=False)
     console.print(rich_table(found, options.problem, rate_hz), highlight=False)
-    for line in (*lines, *(f"wrote {path}" for path in (options.out, options.plot) if path)):
-        print(line)
+    if scheme is not None:
+        lines.append(f"wrote {options.out}: scheme {scheme.name} (fingerprint {scheme.fingerprint})")
+    if options.plot is not None:
+        lines.append(f"wrote {options.plot}")
+    print("\n".join(lines))
     return 0 if all(one.agrees for one in checks) else DISAGREES
 
 

@@ -4,6 +4,7 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from mtm_audit.commands.unused import unused_options
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.decoding.settings import DecodeSettings
@@ -30,6 +31,7 @@ class ProfileOptions:
     settings: DecodeSettings
     reading: ReadOptions = field(default_factory=ReadOptions)
     force: bool = False
+    given: frozenset[str] = frozenset()
 
 
 def run_profile(options: ProfileOptions) -> None:
@@ -47,6 +49,8 @@ def run_profile(options: ProfileOptions) -> None:
             "record a longer message, or give its start with --onset"
         )
     save_profile(_learn(key, decoding), options.out)
+    for warning in unused_options(options.given, kind, key.scheme.schedule):
+        sys.stdout.write(f"warning: {warning}\n")
     sys.stdout.write(f"wrote {options.out}; give it to mtm-audit decode with --profile\n")
 
 

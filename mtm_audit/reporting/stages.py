@@ -20,11 +20,6 @@ from mtm_audit.reporting.text import (
 from mtm_onboard.protocol.framing import payload_bits
 
 _TRY = {
-    "key": "make one with mtm-onboard keygen, or name the file that the robot was provisioned with",
-    "recording": "play the file in another program to see whether it is whole",
-    "tracks": "film the markers larger and sharper, or choose another --tracker; --assign pairs bodies with tracks",
-    "glimpse": "record longer, with the robot in sight",
-    "timing": "record at least one whole message, or give --onset when it is known when the message began",
     "symbols": "record longer or from closer; repeats of the message add up",
     "message": "give --onset when it is known, and check what the robot was told to send",
     "verdict": "check that the key is the robot's, that it was sending (its journal says), and record longer",
@@ -33,11 +28,15 @@ _TRY = {
 
 @dataclass(frozen=True)
 class Stage:
-    """What one stage found, in short lines; `failed` when the decode came no further than this."""
+    """What one stage found, in short lines; `failed` when the decode came no further than this.
+
+    `says_what_to_do` when the lines are a refusal, which says so itself.
+    """
 
     name: str
     lines: tuple[str, ...]
     failed: bool = False
+    says_what_to_do: bool = False
 
 
 def text_of_stages(stages: Sequence[Stage]) -> str:
@@ -47,7 +46,8 @@ def text_of_stages(stages: Sequence[Stage]) -> str:
         said = list(stage.lines)
         if stage.failed:
             said[0] = f"FAILED: {said[0]}"
-            said.append(f"try: {_TRY[stage.name]}")
+            if not stage.says_what_to_do:
+                said.append(f"try: {_TRY[stage.name]}")
         lines += [f"{stage.name if row == 0 else '':<11}{line}" for row, line in enumerate(said)]
     return "\n".join(lines) + "\n"
 

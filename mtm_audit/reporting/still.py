@@ -21,7 +21,10 @@ _WIDEST_PX, _QUALITY = 960, 80
 
 @dataclass(frozen=True)
 class Still:
-    """A picture `image` (height, width, 3) in the order blue, green, red; `mirrored` where tracks are of its mirror."""
+    """A picture `image` (height, width, 3) in the order blue, green, red, at `time_s` of the recording.
+
+    `mirrored` where the tracks are of its mirror.
+    """
 
     image: Image
     time_s: float
@@ -55,11 +58,14 @@ def still_of(recording: Recording, tracker_name: str | None = None) -> Still | N
         return None
     seen = np.sum([track.valid[:_MOST_LOOKED_AT] for track in recording.tracks], axis=0)
     number = int(np.argmax(seen))
-    with suppress(MtmError, OSError):
-        frames = film_frames(recording.paths, "bgr", lambda warning: None, None)
-        frame = next(islice(frames, number, None), None)
-        if frame is not None:
-            return Still(frame.image.copy(), frame.time_s, tracker_name is not None and _mirrored(frame, tracker_name))
+    # A film that states no times was read at a rate that was given.
+    for frame_rate_hz in (None, recording.frame_rate_hz):
+        with suppress(MtmError, OSError):
+            frames = film_frames(recording.paths, "bgr", lambda warning: None, frame_rate_hz)
+            frame = next(islice(frames, number, None), None)
+            if frame is not None:
+                mirrored = tracker_name is not None and _mirrored(frame, tracker_name)
+                return Still(frame.image.copy(), float(recording.tracks[0].times_s[number]), mirrored)
     return None
 
 

@@ -1,5 +1,6 @@
 """What a picture or a report is about: recording, key and dates in one line."""
 
+import time
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,7 +17,7 @@ def subject_line(recording: Recording, decoding: Decoding, drawn: datetime) -> s
         [
             f"recording {files_named(recording.paths)}",
             f"key {decoding.key_id} (scheme {decoding.scheme.name}, {decoding.scheme.fingerprint})",
-            f"recorded {_utc(at)}" if at is not None else "recorded at an unknown time",
+            f"recorded {_begun(at, recording)}" if at is not None else "recorded at an unknown time",
             f"drawn {dated(drawn)}",
         ]
     )
@@ -35,8 +36,10 @@ def dated(when: datetime) -> str:
 
 def now() -> datetime:
     """The present moment with the machine's zone."""
-    return datetime.now().astimezone()
+    return datetime.fromtimestamp(time.time(), UTC).astimezone()
 
 
-def _utc(at: RecordedAt) -> str:
-    return f"{datetime.fromtimestamp(at.unix_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
+def _begun(at: RecordedAt, recording: Recording) -> str:
+    """When the first observation was made; `at` is when the recording's own clock stood at zero."""
+    first_s = min(float(track.times_s[0]) for track in recording.tracks)
+    return f"{datetime.fromtimestamp(at.unix_s + first_s, UTC):%Y-%m-%d %H:%M:%S} UTC"

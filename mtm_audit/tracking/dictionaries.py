@@ -25,6 +25,7 @@ FAMILIES = (
 _USUAL_SIZE = 250
 _TWICE = 2
 _FEWEST_WORDS = "apriltag_16h5"
+LEAST_CELL_PX = 2.0  # of a marker that is named; what is read of less is mostly writing
 
 
 @lru_cache
@@ -82,14 +83,17 @@ def shown_instead(images: Sequence[Image], chosen: str) -> str | None:
 
 
 def exact_readings(family: str, image: Image) -> list[tuple[int, Floats]]:
-    """Numbers and corners (4, 2) of the family's markers in a picture that are read without a wrong cell."""
+    """Numbers and corners (4, 2) of the family's markers in a picture that are large, and read without a wrong cell."""
     parameters = detector_parameters()
     parameters.errorCorrectionRate = 0.0
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
+    least_px = LEAST_CELL_PX * cells_of(family)
     quads, numbers, _ = cv2.aruco.ArucoDetector(dictionary_of(family), parameters).detectMarkers(image)
     found = [] if numbers is None else np.ravel(numbers)
     return [
         (int(number), np.asarray(quad, dtype=np.float64).reshape(4, 2))
         for number, quad in zip(found, quads, strict=True)
+        if np.sqrt(cv2.contourArea(quad)) >= least_px
     ]
 
 
@@ -103,7 +107,7 @@ def _seen_of(family: str, images: Sequence[Image]) -> tuple[str, dict[int, int]]
     """The family, and in how many pictures each of its markers is, those left out that chance may have made."""
     counts: Counter[int] = Counter()
     for image in images:
-        counts.update(number for number, _ in exact_readings(family, image))
+        counts.update({number for number, _ in exact_readings(family, image)})
     least = min(_TWICE, len(images))
     return family, {number: count for number, count in counts.items() if count >= least}
 

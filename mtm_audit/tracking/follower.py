@@ -1,6 +1,7 @@
 """Following markers from picture to picture, each copy of a marker by its continuity."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,8 @@ from mtm_audit.tracking.markers import MarkerFinder, Sighting
 
 READ_EVERY_S = 0.25  # after which a marker's number is read again
 SURPRISE_SIDES = 0.08  # how far a corner may be from where it is expected, in sides, without being read
-FULL_SEARCH_EVERY_S = 0.75  # after which the whole picture is searched for markers that are new
+SEARCH_EVERY_S = 0.75  # after which the whole picture is searched for markers that are new
+FULL_SEARCH_EVERY = 3  # of those searches; the others are quick
 SEEN_AT_LEAST = 3  # frames; what is read less often is a chance reading of something else
 # For a marker out of sight the whole picture is searched in every frame at first, and then each time that it has been
 # so for a fifth longer.
@@ -25,6 +27,8 @@ _COPIES = "bcdefghijklmnopqrstuvwxyz"
 
 # A marker's number, and which of its copies: 0, 1 and so on in the order of their appearance.
 Copy = tuple[int, int]
+# Where the copies were seen, by their keys and the numbers of frames.
+Seen = dict[str, dict[int, tuple[float, float, float]]]
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,7 @@ class MarkerFollower:
         self._followed: dict[Copy, _Followed] = {}
         self._places: dict[Copy, list[Floats]] = {}
         self._searched_s = self._last_s = -np.inf
+        self._quick_searches = 0
         # Sightings by number of markers that cannot be read in a mirror, and of all markers.
         self.decisive: Counter[int] = Counter()
         self.sightings = 0
@@ -71,9 +76,13 @@ class MarkerFollower:
         continued = self._continued(image, frame.time_s)
         read = self._nearby(image, frame.time_s, except_for=continued)
         found = continued | read
-        if self._is_search_due(found, frame.time_s):
+        is_lost = self._is_lost_one_due(found, frame.time_s)
+        if is_lost or frame.time_s - self._searched_s >= SEARCH_EVERY_S:
             self._searched_s = frame.time_s
-            self._add_new(self._finder.everywhere(image), found, frame.time_s)
+            is_full = is_lost or self._quick_searches + 1 >= FULL_SEARCH_EVERY
+            self._quick_searches = 0 if is_full else self._quick_searches + 1
+            search = self._finder.everywhere if is_full else self._finder.quickly
+            self._add_new(search(image), found, frame.time_s)
         rough = [copy for copy in found if copy not in continued]
         fine = continued | dict(zip(rough, self._finder.refined(image, [found[copy] for copy in rough]), strict=True))
         for copy, sighting in fine.items():
@@ -84,13 +93,25 @@ class MarkerFollower:
         """One track per marker that was seen often enough, named `marker<number>`.
 
         Of copies that show at once the one that goes farthest has that name, the next `marker<number>b` and so on.
+        More frames may follow.
         """
-        names = self._names()
-        seen = {copy: self._gather.seen[_key(copy)] for copy in names}
-        often = {copy: name for copy, name in names.items() if len(seen[copy]) >= SEEN_AT_LEAST}
-        self._gather.seen = {name: seen[copy] for copy, name in often.items()}
-        self._gather.extents_px = {name: self._gather.extents_px[_key(copy)] for copy, name in often.items()}
-        return self._gather.tracks(with_headings=True)
+        seen = {key: dict(places) for key, places in self._gather.seen.items()}
+        often = {copy: name for copy, name in self._names(seen).items() if len(seen[_key(copy)]) >= SEEN_AT_LEAST}
+        named = Gather(
+            self._gather.height_px,
+            self._gather.times_s,
+            {name: seen[_key(copy)] for copy, name in often.items()},
+            {name: self._gather.extents_px[_key(copy)] for copy, name in often.items()},
+        )
+        return named.tracks(with_headings=True)
+
+    def latest(self) -> dict[str, tuple[float, float]]:
+        """Column and row of each marker in the last frame, as it was looked at; of several copies one."""
+        return {f"marker{key.partition('/')[0]}": place for key, place in self._gather.latest().items()}
+
+    def forget(self, before_s: float) -> None:
+        """Drop what was seen before then."""
+        self._gather.forget(before_s)
 
     def _continued(self, image: Image, time_s: float) -> dict[Copy, Sighting]:
         """The markers whose sides are where they are expected and as long as before; they were read a moment ago."""
@@ -124,9 +145,10 @@ class MarkerFollower:
                     found[copy] = sighting
         return found
 
-    def _is_search_due(self, found: dict[Copy, Sighting], time_s: float) -> bool:
+    def _is_lost_one_due(self, found: dict[Copy, Sighting], time_s: float) -> bool:
+        """Whether to search for a marker that is out of sight, or for the first one."""
         since_s = time_s - self._searched_s
-        if not self._followed or since_s >= FULL_SEARCH_EVERY_S:
+        if not self._followed:
             return True
         lost = [last for copy, last in self._followed.items() if copy not in found]
         for last in lost:
@@ -170,18 +192,17 @@ class MarkerFollower:
         if not reads_in_a_mirror(self._dictionary, sighting.number):
             self.decisive[sighting.number] += 1
 
-    def _names(self) -> dict[Copy, str]:
+    def _names(self, seen: Seen) -> dict[Copy, str]:
         names: dict[Copy, str] = {}
         for number in {number for number, _ in self._followed}:
-            self._join(number)
-            copies = [copy for copy in self._followed if copy[0] == number and _key(copy) in self._gather.seen]
-            copies.sort(key=self._reach_px, reverse=True)
+            self._join(number, seen)
+            copies = [copy for copy in self._followed if copy[0] == number and _key(copy) in seen]
+            copies.sort(key=lambda copy: _reach_px(seen[_key(copy)]), reverse=True)
             names |= {copy: f"marker{number}{letter}" for copy, letter in zip(copies, ["", *_COPIES], strict=False)}
         return names
 
-    def _join(self, number: int) -> None:
+    def _join(self, number: int, seen: Seen) -> None:
         """Make copies one that never show in the same frame: a marker that leapt."""
-        seen = self._gather.seen
         copies = [_key(copy) for copy in self._followed if copy[0] == number]
         for place, later in enumerate(copies):
             for earlier in copies[:place]:
@@ -189,9 +210,9 @@ class MarkerFollower:
                     seen[earlier] |= seen.pop(later)
                     break
 
-    def _reach_px(self, copy: Copy) -> float:
-        places = np.array(list(self._gather.seen[_key(copy)].values()))[:, :2]
-        return float(np.ptp(places, axis=0).max())
+
+def _reach_px(places: Mapping[int, tuple[float, float, float]]) -> float:
+    return float(np.ptp(np.array(list(places.values()))[:, :2], axis=0).max())
 
 
 def _key(copy: Copy) -> str:

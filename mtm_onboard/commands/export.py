@@ -9,7 +9,7 @@ from mtm_onboard.commands.contentoptions import add_content, content
 
 if TYPE_CHECKING:
     from mtm_onboard.firmware.image import Image
-    from mtm_onboard.protocol import Channel, Scheme
+    from mtm_onboard.protocol import Channel, Key, Scheme
 
 # DJI's limits for the chassis; others are options.
 _SPEED_MPS = 3.5
@@ -34,7 +34,10 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     length.add_argument(
         "--span", type=float, metavar="SECONDS", help="rolling schedule: messages for at least this long"
     )
-    parser.add_argument("--first-message", type=int, metavar="N", default=0, help="rolling schedule: slot of the first")
+    parser.add_argument(
+        "--first-message", type=int, metavar="N",
+        help="rolling schedule: slot of the first (the next that begins; 0 for keys of format 1)",
+    )  # fmt: skip
     parser.add_argument(
         "--limit-mps", type=float, metavar="MPS", default=_SPEED_MPS, help="largest |vx| and |vy| sent (%(default)s)"
     )
@@ -78,8 +81,9 @@ def run(args: argparse.Namespace) -> int:
     channel = _channel(scheme, args.channel)
     message, messages = message_of(content(args), key), _messages(args, scheme)
     # More messages than an image holds are refused below.
-    last = args.first_message + min(messages, MAX_MESSAGES)
-    slots = range(args.first_message, last) if scheme.schedule == "rolling" else range(1)
+    first = _first_message(args, key)
+    last = first + min(messages, MAX_MESSAGES)
+    slots = range(first, last) if scheme.schedule == "rolling" else range(1)
     own = [channel_symbols(message.symbols(slot), scheme)[channel.name] for slot in slots]
     image = channel_image(
         key.codebook(),
@@ -87,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
         [symbol for symbols in own for symbol in symbols],
         limits=(args.limit_mps, args.limit_mps, args.limit_radps),
         repeat=not args.no_repeat,
-        first_message=args.first_message,
+        first_message=first,
         messages=messages,
     )
     # The tag is of format 1, whose secret whoever provisions has; files of format 2 leave it empty.
@@ -97,9 +101,10 @@ def run(args: argparse.Namespace) -> int:
         temporary.write_bytes(data)
     seconds = image.samples.shape[1] / scheme.rate_hz
     ending = "again and again" if image.repeats else "once"
+    since = f" from slot {first} on" if scheme.schedule == "rolling" else ""
     print(
-        f"wrote {args.out}: {len(data)} bytes, channel {channel.name}, {image.messages} message(s) in {seconds:g} s, "
-        f"{ending}, {scheme.rate_hz:g} Hz, scheme {scheme.fingerprint}"
+        f"wrote {args.out}: {len(data)} bytes, channel {channel.name}, {image.messages} message(s) in {seconds:g} s"
+        f"{since}, {ending}, {scheme.rate_hz:g} Hz, scheme {scheme.fingerprint}"
     )
     return 0
 
@@ -116,6 +121,17 @@ def _sealed(args: argparse.Namespace, scheme: "Scheme", channel: "Channel", imag
     most = channel.sigma * (_NOISE_SIGMAS if args.noise_limit is None else args.noise_limit)
     limits = [most if axis in channel.axes else 0.0 for axis in AXES]
     return sealed(image, seal_of(number, counter, limits), load_device_key(args.device_key))
+
+
+def _first_message(args: argparse.Namespace, key: "Key") -> int:
+    """The slot of the first message: as asked, else the next that begins, where a key's waveforms follow the day."""
+    from time import time
+
+    from mtm_onboard.protocol.slots import next_slot
+
+    if args.first_message is not None:
+        return int(args.first_message)
+    return 0 if key.scheme.schedule == "fixed" or key.holding.grant is None else next_slot(time(), key.scheme)
 
 
 def _channel(scheme: "Scheme", name: str | None) -> "Channel":

@@ -23,13 +23,3 @@ def missing_sentence(error: ModuleNotFoundError, program: str, extra: str) -> st
     if library in ("", "mtm_onboard", "mtm_audit", "hil"):
         raise error
     return f"{program} needs {library}, which is not installed; install it with: {install_command(extra)}"
-
-
-def program_version() -> str:
-    """The distribution's version, or that it runs from where it was not installed."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version(DISTRIBUTION)
-    except PackageNotFoundError:
-        return "(not installed, so without a version)"

@@ -18,6 +18,7 @@ from mtm_onboard.protocol.keystream import SECRET_BYTES
 from mtm_onboard.protocol.master import USUAL_DAYS, new_master
 from mtm_onboard.protocol.scheme import Scheme, scheme_from_table
 from mtm_onboard.protocol.schemefile import scheme_text
+from mtm_onboard.protocol.secret_file import looks_like_key
 
 # Format 1 has one secret for everything, format 2 a part of the key tree.
 KEY_FORMATS = (1, 2)
@@ -138,6 +139,10 @@ def _secret(text: Any, path: Path) -> bytes:
 def _read_private_toml(path: Path) -> dict[str, Any]:
     try:
         with opened(path, "the key file") as file:
+            # What is no key file need not be kept from others, so this comes first.
+            if not looks_like_key(file.read(LARGEST_TEXT_BYTES)):
+                raise MtmError(f"{path} is no key file; name the file that mtm-onboard keygen or issue wrote")
+            file.seek(0)
             mode = os.fstat(file.fileno()).st_mode
             if mode & 0o077:
                 raise MtmError(f"{path} can be read by others (mode {mode & 0o777:04o}); run: chmod 600 {path}")

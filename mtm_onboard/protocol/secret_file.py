@@ -14,6 +14,14 @@ _SECRET = re.compile(
     re.MULTILINE,
 )
 
+# Fields of key files of every kind, so that what is damaged or written by hand is still taken for one.
+_KEY_FIELD = re.compile(rb"^\s*(?:format|id|kind|serial|secret)\s*=|^\s*\[scheme\]", re.MULTILINE)
+
+
+def looks_like_key(data: bytes) -> bool:
+    """Whether a file that begins so may have been meant as a key file: text with any of its fields."""
+    return b"\0" not in data and _KEY_FIELD.search(data) is not None
+
 
 def holds_secret(path: Path) -> bool:
     """Whether the file at `path` is a key file of any kind, whole or damaged; one that cannot be read counts as one.

@@ -124,7 +124,7 @@ def test_a_missing_robot_is_named_with_what_would_help(audit, folder):
     code, out, _ = audit(folder / "sent/robot0.tum", *QUICK)
     assert code == 4
     assert out.startswith("inconclusive:")
-    assert "not seen: symbol 1, which robot1 sends" in out
+    assert "not seen: symbol 1, the part of robot1" in out
     assert "warning: no track shows robot1" in out
 
 
@@ -502,7 +502,7 @@ def test_a_report_never_takes_the_place_of_a_key(audit, folder, tmp_path):
 
 def test_a_report_is_refused_before_the_work(audit, folder, tmp_path, monkeypatch):
     monkeypatch.setattr("mtm_audit.decoding.recorded.decode_tracks", lambda *_: pytest.fail("worked first"))
-    refused(audit(folder / "sent", "--report", tmp_path / "report.txt"), "end it in .html or .htm")
+    refused(audit(folder / "sent", "--report", tmp_path / "report.txt"), "end it in .html or .htm", code=2)
     refused(audit(folder / "sent", "--report", tmp_path / "nowhere/report.html"), "there is no folder")
     refused(audit(folder / "sent", "--report", tmp_path / "a.html", "--plot", tmp_path / "a.html"), "for two results")
 

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from hil.experiments.runs.cells import Cell, Scalar, Values
-from hil.experiments.verdicts.forgers import ATTACKS, ERROR_S, PRELUDE_S, STREAM, Fleet, holder_of
+from hil.experiments.verdicts.forgers import ATTACKS, ERROR_S, PRELUDE_S, STREAM, Film, Fleet, holder_of
 from hil.plants.responses import Floats, lag
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.frames import Heard, decode_frames
@@ -71,15 +71,22 @@ def one_try(name: str, role: str, seed: int) -> tuple[str, ...]:
     draw = np.random.default_rng([STREAM, sorted(ATTACKS).index(name), role == FORGED, seed])
     at_s = datetime(2026, 11, 30, 1, tzinfo=UTC).timestamp() + float(draw.uniform(0.0, 22 * 3600.0))
     fleet = Fleet(holder_of(int(draw.integers(0, 4)), scheme), scheme, slot_at(at_s, scheme), draw)
-    film = make(fleet)
-    at = RecordedAt(film.began_unix_s, ERROR_S)
-    auditor = fleet.key
+    return decoded(make(fleet), fleet, in_full=role == CONTROL)
+
+
+def decoded(film: Film, fleet: Fleet, *, in_full: bool = True) -> tuple[str, ...]:
+    """What an auditor of the film's day makes of it, as in `COUNTS`.
+
+    Unless `in_full`, a film of one robot that shows no right tag is decoded no further and gets no word.
+    """
+    scheme, at, auditor = fleet.scheme, RecordedAt(film.began_unix_s, ERROR_S), fleet.key
     if not isinstance(fleet.holder, bytes):
         day = datetime.fromtimestamp(film.began_unix_s, UTC).date()
         auditor = Key("fake-fleet", fleet.holder.for_auditor(day, day), scheme)
-    tracks = [filmed(channel.body, noise, draw) for channel, noise in zip(scheme.channels, film.noise, strict=True)]
+    bodies = zip(scheme.channels, film.noise, strict=True)
+    tracks = [filmed(channel.body, noise, fleet.draw) for channel, noise in bodies]
     try:
-        if role == FORGED and len(tracks) == 1 and not shows_a_right_tag(tracks[0], auditor, at):
+        if not in_full and len(tracks) == 1 and not shows_a_right_tag(tracks[0], auditor, at):
             return ()
         return _decoded(tracks, auditor, at)
     except MtmError:

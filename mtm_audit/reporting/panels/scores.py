@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from mtm_audit.decoding.decoding import Decoding
@@ -39,11 +40,9 @@ def draw_scores(axes: Axes, decoding: Decoding) -> None:
             if np.isfinite(score):
                 colour = "white" if score > (low + high) / 2.0 else "#344054"
                 axes.text(symbol, row, written(float(score)), ha="center", va="center", fontsize=9, color=colour)
-    framed = [(number, row.symbol) for number, row in enumerate(rows) if row.symbol is not None]
-    if framed:
-        axes.plot([symbol for _, symbol in framed], [number for number, _ in framed], "s", zorder=3,
-                  markersize=26 if len(rows) <= 6 else 10, markerfacecolor="none", markeredgecolor="#e4572e",
-                  markeredgewidth=2.0)  # fmt: skip
+    framed = [(row.symbol, number) for number, row in enumerate(rows) if row.symbol is not None]
+    for symbol, number in framed:
+        axes.add_patch(Rectangle((symbol - 0.47, number - 0.45), 0.94, 0.9, fill=False, edgecolor="#e4572e", lw=2.0))
     axes.set(title="What each symbol scored" + (" (framed: certain)" if framed else ""), xlabel="symbol")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     name_rows(axes, [row.name for row in rows], [row.note for row in rows])

@@ -9,7 +9,7 @@ VERDICT_COLOURS = {"decoded": "#1a7f37", "absent": "#b42318", "inconclusive": "#
 TRACK_COLOURS = ("#3366cc", "#dd7711", "#2a9d5c", "#b03a8c", "#7a5cc9", "#8a6d3b", "#0f8b8d", "#6b7280")
 KEY_COLOUR, QUIET, TEXT_COLOUR, GRID_COLOUR = "#1d3557", "#a9b4c2", "#475467", "#e5e7eb"
 # Rows with more names than this would be unreadable.
-PLACES_NAMED = 24
+PLACES_NAMED, _ROWS_OF_TWO_LINES = 24, 6
 # Tick labels and the label of the axis.
 _LABELS_IN = 0.47
 
@@ -28,10 +28,11 @@ def written(score: float) -> str:
 def name_rows(
     axes: Axes, names: Sequence[str], notes: Sequence[str] | None = None, what: str = "place in the message"
 ) -> None:
-    """Name the rows, each with its note on a line below, or say what they are where there are too many."""
+    """Name the rows, each with its note, or say what they are where there are too many."""
     if len(names) <= PLACES_NAMED:
+        between = "\n" if len(names) <= _ROWS_OF_TWO_LINES else " "
         shown = [
-            f"{plain(name)}\n{plain(note)}" if note else plain(name)
+            f"{plain(name)}{between}{plain(note)}" if note else plain(name)
             for name, note in zip(names, notes or [""] * len(names), strict=True)
         ]
         axes.set_yticks(range(len(names)), shown, fontsize=9)

@@ -16,7 +16,8 @@ def draw_tracks(axes: Axes, tracks: tuple[Track, ...], height_px: int | None = N
     for number, track in enumerate(tracks):
         draw_track(axes, track, number, height_px)
     unit = tracks[0].unit
-    axes.set(title="Where the robots went (● start, □ end)", xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
+    way = ", upwards from the lowest row" if unit == "px" and height_px is None else ""
+    axes.set(title="Where the robots went (● start, □ end)", xlabel=f"x [{unit}]", ylabel=f"y [{unit}{way}]")
     axes.set_aspect("equal", adjustable="datalim")
     if height_px is not None:
         axes.invert_yaxis()

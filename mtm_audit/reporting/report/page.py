@@ -22,7 +22,7 @@ from mtm_audit.reporting.stages import Stage
 from mtm_audit.reporting.subject import files_named, now, subject_line
 from mtm_audit.reporting.text import chance_sentence, facts, rests_on, table_of, verdict_sentence
 from mtm_onboard.protocol.atomicfile import replacing
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import WrongValueError
 from mtm_onboard.protocol.output_file import mark_of
 
 SUFFIXES = (".html", ".htm")
@@ -32,7 +32,7 @@ _TEMPLATE = "report.html.jinja"
 def check_report_path(path: Path) -> None:
     """Raise MtmError for a name that no browser would take for a page."""
     if path.suffix.lower() not in SUFFIXES:
-        raise MtmError(f"{path} is no name for a report, which is a page; end it in {' or '.join(SUFFIXES)}")
+        raise WrongValueError(f"{path} is no name for a report, which is a page; end it in {' or '.join(SUFFIXES)}")
 
 
 def write_report(

@@ -30,12 +30,12 @@ def told(items):
     return [(item.name, 0 if item.source is None else len(item.source.files)) for item in items]
 
 
-def test_files_are_recordings_in_the_order_in_which_they_are_named(lab):
+def test_files_are_recordings_in_the_order_given(lab):
     lab("b.mp4", "a.tum", "c.tum")
     assert told(find("c.tum", "b.mp4", "a.tum")) == [("c.tum", 1), ("b.mp4", 1), ("a.tum", 1)]
 
 
-def test_a_folder_holds_each_film_its_logs_together_and_its_folders(lab):
+def test_a_folder_holds_films_its_logs_together_and_folders(lab):
     lab("lab/b.mp4", "lab/a.mp4", "lab/robot0.tum", "lab/robot1.tum", "lab/day/c.tum", "lab/.hidden/d.tum")
     assert told(find("lab")) == [("lab/a.mp4", 1), ("lab/b.mp4", 1), ("lab", 2), ("lab/day/c.tum", 1)]
 
@@ -52,10 +52,10 @@ def test_chapters_are_one_film_and_a_missing_one_spares_others(lab):
     assert "what lies between them is missing" in broken.refusal
 
 
-def test_pictures_of_a_folder_are_one_film_however_they_are_named(lab):
+def test_pictures_of_a_folder_are_one_film(lab):
     lab("film/1.png", "film/2.png", "film/more/a.tum", "single/1.png")
     assert told(find("film")) == [("film", 1), ("film/more/a.tum", 1)]
-    assert told(find("film/1.png", "film/2.png", "single/1.png")) == [("film", 2), ("single/1.png", 0)]
+    assert told(find("film/1.png", "film/2.png", "single/1.png")) == [("film/1.png", 2), ("single/1.png", 0)]
 
 
 def test_each_path_that_cannot_be_read_says_why(lab):

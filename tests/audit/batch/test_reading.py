@@ -1,18 +1,18 @@
 """What one recording's rows say, by the function that worker processes run."""
 
-import math
 from dataclasses import replace
 
 import pytest
 
 from mtm_audit.batch import reading, told
+from mtm_audit.batch.found import Found
 from mtm_audit.batch.reading import Work, read_rows
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.ingest.recording import read_recording
+from mtm_audit.ingest.source import Source
 from mtm_onboard.protocol import MtmError, save_key
 from mtm_onboard.protocol.key import Key
 from tests.audit.batch.recordings import KEY, SETTINGS, found_at, plan_of, record, save_keys
-from tests.audit.moving_robot import scheme_of
 
 
 @pytest.fixture(scope="module")
@@ -20,6 +20,7 @@ def lab(tmp_path_factory):
     """A folder with both keys, a recording of each, and one without a message."""
     folder = tmp_path_factory.mktemp("lab")
     save_keys(folder)
+    save_key(Key("copy", KEY.secret, KEY.scheme), folder / "copy.key")
     record(folder / "sent.tum", 3)
     record(folder / "silent.tum", None)
     return folder
@@ -68,48 +69,97 @@ def test_absent_rows_of_several_keys_name_none(lab):
     assert rows_of(lab, "silent.tum", "fake")[0].key == str(lab / "fake.key")
 
 
-def test_each_key_that_shows_something_has_a_row(lab, tmp_path):
-    same = Key("copy", KEY.secret, KEY.scheme)
-    save_key(same, lab / "copy.key")
+def test_each_key_that_shows_something_has_a_row(lab):
     rows = rows_of(lab, "sent.tum", "fake", "other", "copy")
     assert [(row.key_id, row.verdict, row.rows) for row in rows] == [("fake", "decoded", "1"), ("copy", "decoded", "1")]
 
 
 def test_a_key_that_cannot_be_tried_is_told_beside_the_others(lab):
-    save_key(Key("long", KEY.secret, scheme_of(symbols=(1,), ticks=30_000)), lab / "long.key")
-    (row,) = rows_of(lab, "sent.tum", "fake", "long")
+    """A rolling key needs to know when the recording was made, and motion capture does not say."""
+    save_key(Key("rolling", KEY.secret, replace(KEY.scheme, schedule="rolling")), lab / "rolling.key")
+    (row,) = rows_of(lab, "sent.tum", "fake", "rolling")
     assert row.verdict == "decoded"
-    if row.warnings:
-        assert "long.key" in row.warnings
+    assert "rolling.key: " in row.warnings
+    (refused,) = rows_of(lab, "sent.tum", "rolling")
+    assert (refused.verdict, refused.key, refused.bits) == ("unreadable", "", "")
+    assert "--at" in refused.error
 
 
-def test_a_second_key_reads_the_tracks_of_the_first(lab, tmp_path, monkeypatch):
-    calls = []
+@pytest.fixture
+def film(lab, tmp_path, monkeypatch):
+    """A film, whose tracks are those of the log here, and a list to which each reading of it adds."""
+    readings = []
 
-    def counted(*arguments, **options):
-        calls.append(arguments)
-        return read_recording(*arguments, **options)
+    def tracked(files, kind, *arguments, **options):
+        readings.append(kind)
+        log = read_recording([lab / "sent.tum"], "motion capture")
+        return replace(log, paths=tuple(files), kind=kind, warnings=(f"{files[0]} is dark",))
 
-    monkeypatch.setattr(reading, "read_recording", counted)
-    first = rows_of(lab, "sent.tum", "other", cache=tmp_path)
-    again = rows_of(lab, "sent.tum", "other", cache=tmp_path)
-    rows_of(lab, "sent.tum", "fake", cache=tmp_path)
-    assert len(calls) == 1
-    assert replace(first[0], seconds="") == replace(again[0], seconds="")
-    rows_of(lab, "silent.tum", "fake", cache=tmp_path)
-    copy = tmp_path / "sent.tum"
-    copy.write_bytes((lab / "sent.tum").read_bytes())
-    read_rows(Work(plan(lab, "fake", cache=tmp_path), found_at(copy)))
-    assert len(calls) == 2
+    monkeypatch.setattr(reading, "read_recording", tracked)
+    monkeypatch.setattr("mtm_audit.decoding.recorded.film_compression", lambda files: None)
+    path = tmp_path / "film.mp4"
+    path.write_bytes(b"pictures")
+
+    def rows_under(name, path=path, **changes):
+        work = Work(plan(lab, name, cache=tmp_path / "cache", **changes), Found(str(path), Source((path,), "video")))
+        return [replace(row, seconds="", run="") for row in read_rows(work)]
+
+    return rows_under, readings, path
 
 
-def test_a_damaged_entry_of_the_cache_is_made_anew(lab, tmp_path):
-    (first,) = rows_of(lab, "sent.tum", "fake", cache=tmp_path)
-    (entry,) = tmp_path.iterdir()
+def test_a_second_key_takes_the_tracks_of_the_first(film, tmp_path):
+    rows_under, readings, path = film
+    first, again, other = rows_under("fake"), rows_under("fake"), rows_under("other")
+    assert (first, [row.verdict for row in first + other]) == (again, ["decoded", "absent"])
+    assert readings == ["video"]
+    (tmp_path / "usb").mkdir()
+    copy = tmp_path / "usb" / path.name
+    copy.write_bytes(path.read_bytes())
+    assert f"{copy} is dark" in rows_under("fake", copy)[0].warnings
+    assert len(readings) == 1
+
+
+@pytest.mark.parametrize(
+    "changes", [{"tracker": "colour:red"}, {"frame_rate_hz": 60.0}, {"reference": ("marker4",)}, {}],
+    ids=["tracker", "rate", "reference", "pictures"],
+)  # fmt: skip
+def test_tracks_of_another_question_are_not_taken(film, changes):
+    rows_under, readings, path = film
+    rows_under("fake")
+    if not changes:
+        path.write_bytes(b"other pictures")
+    rows_under("fake", **changes)
+    assert len(readings) == 2
+
+
+def test_tracks_of_other_code_are_not_taken(film, monkeypatch):
+    rows_under, readings, _ = film
+    rows_under("fake")
+    monkeypatch.setattr(reading, "reading_fingerprint", lambda: "0" * 16)
+    rows_under("fake")
+    assert len(readings) == 2
+
+
+def test_a_damaged_entry_of_the_cache_is_made_anew(film, tmp_path):
+    rows_under, readings, _ = film
+    first = rows_under("fake")
+    (entry,) = (tmp_path / "cache").iterdir()
     whole = entry.read_bytes()
     entry.write_bytes(whole[:1000])
-    assert replace(rows_of(lab, "sent.tum", "fake", cache=tmp_path)[0], seconds="") == replace(first, seconds="")
-    assert entry.read_bytes() == whole
+    assert rows_under("fake") == first
+    assert (len(readings), entry.read_bytes()) == (2, whole)
+
+
+def test_a_folder_that_cannot_be_written_only_costs_time(film, tmp_path):
+    rows_under, readings, _ = film
+    (tmp_path / "cache").write_text("no folder")
+    assert rows_under("fake") == rows_under("fake")
+    assert len(readings) == 2
+
+
+def test_logs_are_read_each_time_with_what_lies_beside_them(lab, tmp_path):
+    rows_of(lab, "sent.tum", "fake", cache=tmp_path / "cache")
+    assert not (tmp_path / "cache").exists()
 
 
 def test_what_has_not_changed_is_not_read_again(lab):
@@ -139,10 +189,3 @@ def test_a_damaged_file_says_why_in_its_row(lab):
 def test_another_version_elsewhere_ends_the_batch(lab):
     with pytest.raises(MtmError, match="another version of the program or its libraries; install the same everywhere"):
         rows_of(lab, "sent.tum", "fake", code="0" * 16)
-
-
-def test_paying_for_keys_is_what_the_evidence_allows(lab):
-    """The limit of every key together: n keys at a threshold each divided by n."""
-    (row,) = rows_of(lab, "sent.tum", "fake", "other", "copy")[:1]
-    (alone,) = rows_of(lab, "sent.tum", "fake")
-    assert float(alone.bits) - float(row.bits) == pytest.approx(math.log2(3.0), abs=0.011)

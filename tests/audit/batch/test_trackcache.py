@@ -48,7 +48,7 @@ def cache(tmp_path):
 def test_a_recording_comes_back_bit_by_bit(cache):
     kept = recording()
     cache.keep(NAME, kept)
-    found = cache.find(NAME, kept.paths, "video")
+    found = cache.find(NAME, kept.paths)
     assert (found.paths, found.kind, found.warnings, found.at) == (kept.paths, "video", kept.warnings, kept.at)
     for before, after in zip(kept.tracks, found.tracks, strict=True):
         plain = ("name", "axes", "unit", "extent_px")
@@ -59,12 +59,12 @@ def test_a_recording_comes_back_bit_by_bit(cache):
 
 def test_a_copy_elsewhere_is_named_where_it_lies(cache):
     cache.keep(NAME, recording(at=None))
-    found = cache.find(NAME, (Path("/usb/a.mp4"),), "video")
+    found = cache.find(NAME, (Path("/usb/a.mp4"),))
     assert (found.warnings, found.at) == (("/usb/a.mp4 has no times", "dark"), None)
 
 
 def test_what_was_not_kept_is_not_found(cache):
-    assert cache.find(NAME, (), "video") is None
+    assert cache.find(NAME, ()) is None
 
 
 @given(st.data())
@@ -77,7 +77,7 @@ def test_a_damaged_entry_is_not_used(tmp_path_factory, data):
     flipped = data.draw(st.booleans())
     damaged = whole[:cut] + (bytes([whole[cut] ^ 1]) + whole[cut + 1 :] if flipped else b"")
     entry.write_bytes(damaged)
-    assert cache.find(NAME, (), "video") is None
+    assert cache.find(NAME, ()) is None
     cache.keep(NAME, recording())
     assert entry.read_bytes() == whole
 
@@ -97,7 +97,7 @@ def test_use_keeps_an_entry_young(cache):
     cache.keep(NAME, recording())
     (entry,) = cache.folder.iterdir()
     os.utime(entry, (1, 1))
-    cache.find(NAME, (), "video")
+    cache.find(NAME, ())
     assert entry.stat().st_mtime > 1e9
 
 

@@ -6,6 +6,7 @@ from hil.sensors.video import write_video
 from mtm_audit.ingest.recording import read_recording
 from mtm_audit.model.picture import Frame
 from mtm_audit.reporting.still import region_of, still_of
+from tests.audit.filmed_robots import Copy, transcode
 from tests.audit.reporting.pictured import both_sent
 
 HEIGHT, WIDTH, BESIDE = 120, 400, 60
@@ -48,6 +49,16 @@ def test_a_mirrored_film_is_shown_as_its_markers_are_read(tmp_path):
     shown = cv2.imdecode(np.frombuffer(still.jpeg(), dtype=np.uint8), cv2.IMREAD_GRAYSCALE)
     assert shown[30:78, BESIDE - 24 : BESIDE + 24].mean() < 160
     assert shown[30:78, WIDTH - BESIDE - 24 : WIDTH - BESIDE + 24].mean() > 240
+
+
+def test_a_film_without_times_has_a_still(tmp_path):
+    filmed(tmp_path / "film.mp4", [None] * 3 + [100 + step for step in range(30)])
+    bare = Copy(suffix=".h264", codec="libx264", format="h264")
+    transcode(tmp_path / "film.mp4", tmp_path / "film.h264", bare)
+    recording = read_recording([tmp_path / "film.h264"], "video", frame_rate_hz=15.0)
+    still = still_of(recording, "aruco")
+    assert still.time_s == pytest.approx(3 / 15)
+    assert still.size_px == (WIDTH, HEIGHT)
 
 
 def test_motion_capture_and_lost_films_have_no_still(tmp_path):

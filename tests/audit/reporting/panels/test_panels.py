@@ -92,8 +92,7 @@ def test_an_exchanged_robot_s_bar_says_where_it_is(axes):
 @pytest.mark.parametrize(("made", "certain"), [(both_sent, [(3, 0), (1, 1)]), (one_silent, [(3, 0)])])
 def test_only_certain_symbols_are_framed(axes, made, certain):
     draw_scores(axes, made()[1])
-    (framed,) = axes.lines
-    assert list(zip(*framed.get_data(), strict=True)) == certain
+    assert [tuple(np.round(frame.get_center())) for frame in axes.patches] == certain
 
 
 def test_what_is_not_certain_has_no_lead(axes):
@@ -172,6 +171,11 @@ def test_tracks_over_a_picture_fill_exactly_it(axes):
     draw_tracks_over(axes, (pixels(),), (100, 50))
     assert (axes.get_xlim(), axes.get_ylim()) == ((-0.5, 99.5), (49.5, -0.5))
     assert [text.get_text() for text in axes.texts] == ["marker0"]
+
+
+def test_pixels_of_a_picture_of_unknown_height_say_so(axes):
+    draw_tracks(axes, (pixels(),))
+    assert axes.get_ylabel() == "y [px, upwards from the lowest row]"
 
 
 def test_tracks_in_metres_point_up(axes):
