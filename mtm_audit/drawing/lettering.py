@@ -90,7 +90,9 @@ def _mask(text: str, size_px: int) -> np.ndarray[tuple[int, int], np.dtype[np.fl
     from PIL import Image as Pictures
     from PIL import ImageDraw, ImageFont
 
-    font = ImageFont.truetype(str(_font_file()), size_px)
+    # Names come from files: a line stays a line. The other way of setting letters is there on some machines only.
+    text = "".join(letter if letter.isprintable() else "?" for letter in text)
+    font = ImageFont.truetype(str(_font_file()), size_px, layout_engine=ImageFont.Layout.BASIC)
     height = sum(font.getmetrics())
     picture = Pictures.new("L", (max(round(font.getlength(text)), 1), height))
     ImageDraw.Draw(picture).text((0, 0), text, font=font, fill=255)

@@ -1,6 +1,7 @@
 """A picture of a film with what was seen in it drawn over it."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -31,6 +32,7 @@ def draw(image: Image, marks: Sequence[Mark], caption: Sequence[str] = ()) -> Im
     """
     shown = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
     picture: Image = np.asarray(shown, dtype=np.uint8)
+    marks = [_drawable(mark) for mark in marks]
     for mark in marks:
         _draw_trail(picture, mark)
     for mark in marks:
@@ -42,9 +44,29 @@ def draw(image: Image, marks: Sequence[Mark], caption: Sequence[str] = ()) -> Im
 def polyline(image: Image, points: Floats, colour: Bgr, *, closed: bool, thick: int | None = None) -> None:
     """Draw a line with a dark edge through `points` (n, 2), columns and rows, in place."""
     width = line_px(image.shape[0]) if thick is None else thick
-    fixed = np.rint(np.clip(points, -_FARTHEST_PX, _FARTHEST_PX) * (1 << _SHIFT)).astype(np.int32)
+    fixed = np.rint(_near(points) * (1 << _SHIFT)).astype(np.int32)
     for ink, breadth in ((HALO, width + 2), (colour, width)):
         cv2.polylines(image, [fixed], closed, ink, breadth, cv2.LINE_AA, _SHIFT)
+
+
+def _drawable(mark: Mark) -> Mark:
+    """The mark without what is no number, and with nothing farther out than lines can be drawn."""
+    place = None if mark.place is None or not np.isfinite(mark.place).all() else _near(np.array(mark.place))
+    outline = None if mark.outline is None or not np.isfinite(mark.outline).all() else _near(mark.outline)
+    is_turned = mark.heading_rad is not None and np.isfinite(mark.heading_rad)
+    is_passing = mark.passed is not None and np.isfinite(mark.passed)
+    return replace(
+        mark,
+        place=None if place is None else (float(place[0]), float(place[1])),
+        outline=outline,
+        heading_rad=mark.heading_rad if is_turned else None,
+        trail=_near(mark.trail),
+        passed=mark.passed if is_passing else None,
+    )
+
+
+def _near(points: Floats) -> Floats:
+    return np.asarray(np.clip(points, -_FARTHEST_PX, _FARTHEST_PX))
 
 
 def _draw_trail(image: Image, mark: Mark) -> None:
@@ -70,7 +92,7 @@ def _draw_shape(image: Image, mark: Mark) -> None:
             polyline(image, np.stack([middle - arm, middle + arm]), mark.colour, closed=False)
     else:
         polyline(image, mark.outline, mark.colour, closed=True)
-    if mark.heading_rad is not None and np.isfinite(mark.heading_rad):
+    if mark.heading_rad is not None:
         ahead = np.array([np.cos(mark.heading_rad), -np.sin(mark.heading_rad)])
         length = 2.0 * reach if mark.outline is None else float(np.ptp(mark.outline, axis=0).max())
         polyline(image, np.stack([middle, middle + 0.8 * length * ahead]), mark.colour, closed=False)
@@ -175,7 +197,6 @@ def _body_box(mark: Mark, height_px: int) -> _Box:
     reach = 2.0 * _reach_px(height_px)
     around = np.array(mark.last_place) + np.array([[-reach, -reach], [reach, reach]])
     corners = np.concatenate([around, mark.outline]) if mark.outline is not None and mark.place else around
-    corners = np.clip(corners, -_FARTHEST_PX, _FARTHEST_PX)
     margin = line_px(height_px) + 2
     low, high = np.floor(corners.min(axis=0)).astype(int) - margin, np.ceil(corners.max(axis=0)).astype(int) + margin
     return int(low[0]), int(low[1]), int(high[0]), int(high[1])

@@ -91,7 +91,7 @@ class Marker:
         number = _NUMBER.fullmatch(shown.track.name)
         if self._finder is None or number is None:
             return _circle(place, _OWN_SHARE * extent_px)
-        heading = 0.0 if shown.headings_rad is None else float(shown.headings_rad[row])
+        heading = 0.0 if shown.headings_rad is None else float(np.nan_to_num(shown.headings_rad[row]))
         expected = _square(place, extent_px / BODY_SIDES, heading)
         found = self._finder.near(*self._readable(image, int(number[1]), expected))
         if found is None:

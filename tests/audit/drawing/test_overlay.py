@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mtm_audit.drawing.lettering import line_px, put_text, text_px
 from mtm_audit.drawing.mark import Mark
@@ -85,6 +87,33 @@ def test_a_label_that_found_no_room_is_led_to_its_mark():
     led = has_colour(draw(GRAY, crowd), last.colour).sum()
     alone = has_colour(draw(GRAY, [last]), last.colour).sum()
     assert led > alone
+
+
+def test_a_name_of_several_lines_stays_one():
+    one, cut = (draw(GRAY, [], (text,)) for text in ("film?.mp4", "film\n.mp4"))
+    assert np.array_equal(one, cut)
+
+
+COORDINATES = st.floats(-1e9, 1e9) | st.floats(-100, 600) | st.just(float("nan"))
+PLACES = st.tuples(COORDINATES, COORDINATES)
+MARKS = st.builds(
+    Mark,
+    name=st.text(max_size=12),
+    place=st.none() | PLACES,
+    outline=st.none() | st.lists(PLACES, min_size=1, max_size=5).map(np.array),
+    heading_rad=st.none() | COORDINATES,
+    trail=st.lists(PLACES, max_size=6).map(lambda places: np.array(places).reshape(-1, 2)),
+    notes=st.lists(st.text(max_size=8), max_size=2).map(tuple),
+    passed=st.none() | COORDINATES,
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(MARKS, max_size=4), st.tuples(st.integers(1, 90), st.integers(1, 120)), st.text(max_size=20))
+def test_whatever_was_seen_can_be_drawn(marks, shape, caption):
+    picture = draw(np.full(shape, 128, np.uint8), marks, (caption,))
+    assert picture.shape[1:] == (shape[1], 3)
+    assert picture.shape[0] >= shape[0]
 
 
 @pytest.mark.parametrize("place", [(-500.0, 20.0), (479.0, 359.0), (0.0, 0.0), (1e6, -1e6)])

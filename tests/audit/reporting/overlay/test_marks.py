@@ -71,6 +71,11 @@ def test_a_coloured_patch_is_circled_as_large_as_it_is():
     assert mark.name == "red"
 
 
+def test_a_marker_of_unknown_heading_is_still_outlined():
+    (mark,) = marks_of(replace(TRACK, headings_rad=np.full(3, np.nan)), dictionary="6x6_250")
+    assert np.isfinite(mark.outline).all()
+
+
 def test_an_arm_s_angles_are_written_without_a_place():
     arm = Track("arm", TIMES_S, np.full((3, 2), np.pi / 2), np.ones(3, bool), axes=("inner", "outer"), unit="rad")
     (mark,) = marks_of(arm, dictionary=None, windows=())
