@@ -24,7 +24,7 @@ LEVELS = {
     ),
     "mtm_audit": (
         "model", "readers", "tracking", "drawing", "ingest", "detectors", "survey", "significance", "decoding",
-        "reporting", "planning", "batch", "commands", "cli", "__main__",
+        "reporting", "planning", "batch", "live", "commands", "cli", "__main__",
     ),
     "hil": (
         "plants", "wires", "vehicles", "sensors", "worlds", "fleet", "experiments.runs", "experiments.detectors",

@@ -29,6 +29,7 @@ from hil.experiments.verdicts.validity import (
     summarise_validity,
     validity_cells,
 )
+from hil.experiments.verdicts.watched import SECONDS, summarise_watched, watch_silent, watched_cells
 from mtm_onboard.protocol.errors import WrongValueError
 
 Row = tuple[object, ...]
@@ -36,6 +37,9 @@ Row = tuple[object, ...]
 _VALIDITY_COLUMNS = (
     "kind", "recordings", "keys", "refused", "decoded", "inconclusive", "not_finite", "mean_e", "mean_e_error",
     "mean_symbol_e", "mean_symbol_e_error", "most_bits", "level", "below", "low", "high",
+)  # fmt: skip
+_WATCHED_COLUMNS = (
+    "streams", "seconds", "looks", "weighed", "decoded", "low", "high", "inconclusive", "most_bits",
 )  # fmt: skip
 _SURE_COLUMNS = (
     "plant", "threshold", "messages", "wrong", "wrong_low", "wrong_high", "right", "right_low", "right_high",
@@ -164,6 +168,24 @@ def _power_row(summary: PowerSummary) -> Row:
         f"{high:.5f}", summary.wrong, summary.inconclusive, summary.absent, summary.likeliest,
         summary.likeliest_absent,
     )  # fmt: skip
+
+
+def watched(options: VerdictOptions, console: Console) -> None:
+    """Print and, where asked, write what watching silent robots gave."""
+    with CellStore(options.cells) as store:
+        cells = watched_cells(options.count, options.seed)
+        summary = summarise_watched(run_sweep(watch_silent, cells, store, console, options.workers))
+    low, high = _interval(summary.decoded, summary.streams)
+    print(
+        f"{summary.streams} silent streams of {SECONDS:g} s, {summary.looks} looks, {summary.weighed} of these more "
+        f"than a glance: {summary.decoded} decoded (95 % interval {low:.5f} to {high:.5f}), {summary.inconclusive} "
+        f"inconclusive, at most {summary.most_bits:.1f} bits"
+    )
+    row = (
+        summary.streams, f"{SECONDS:g}", summary.looks, summary.weighed, summary.decoded, f"{low:.6f}", f"{high:.6f}",
+        summary.inconclusive, f"{summary.most_bits:.2f}",
+    )  # fmt: skip
+    _write("watched", options, _WATCHED_COLUMNS, [row])
 
 
 def _interval(successes: int, trials: int) -> tuple[float, float]:

@@ -34,7 +34,7 @@ from mtm_audit.reporting.text import print_report
 from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.output_file import check_outputs
 
-_PIPE_COLUMNS = 140
+PIPE_COLUMNS = 140
 EXIT_CODES = {"decoded": 0, "absent": 3, "inconclusive": 4}
 
 
@@ -239,7 +239,7 @@ def _publish(
         return json_report(recording, decoding, warnings, basis)
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
     # What users name is printed as it is: a track may be called body[left].
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS, markup=False, emoji=False)
+    console = Console(width=None if sys.stdout.isatty() else PIPE_COLUMNS, markup=False, emoji=False)
     with console.capture() as captured:
         print_report(console, recording, decoding, warnings, basis)
     return captured.get()

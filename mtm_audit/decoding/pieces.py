@@ -45,7 +45,7 @@ def pieces_of(tracks: Sequence[Track], scheme: Scheme, onset_s: float | None) ->
     first_s = min(float(track.times_s[0]) for track in shown)
     last_s = max(float(track.times_s[-1]) for track in shown)
     message_s = scheme.message_ticks / scheme.rate_hz
-    length_s = max(_PIECE_S, _MESSAGES_A_PIECE * message_s)
+    length_s = piece_length_s(scheme)
     if last_s - first_s <= max(LONGEST_WHOLE_S, 2.0 * length_s):
         return []
     if not last_s - first_s <= _LONGEST_S:
@@ -61,12 +61,18 @@ def pieces_of(tracks: Sequence[Track], scheme: Scheme, onset_s: float | None) ->
     return [_piece(shown, float(begin_s), float(begin_s) + length_s, count) for begin_s in begins_s]
 
 
+def piece_length_s(scheme: Scheme) -> float:
+    """How long a piece is: long enough for what one shows of a message, and no longer than clocks run alike."""
+    return max(_PIECE_S, _MESSAGES_A_PIECE * scheme.message_ticks / scheme.rate_hz)
+
+
 def _piece(tracks: Sequence[Track], begin_s: float, end_s: float, count: int) -> Piece:
-    cut = (_cut(track, begin_s, end_s) for track in tracks)
+    cut = (part_of_track(track, begin_s, end_s) for track in tracks)
     return Piece(begin_s, end_s, count, tuple(track for track in cut if track.valid.any()))
 
 
-def _cut(track: Track, begin_s: float, end_s: float) -> Track:
+def part_of_track(track: Track, begin_s: float, end_s: float) -> Track:
+    """The observations from `begin_s` on that come before `end_s`."""
     at = slice(*np.searchsorted(track.times_s, [begin_s, end_s]))
     headings_rad = None if track.headings_rad is None else track.headings_rad[at]
     return replace(

@@ -55,30 +55,29 @@ class ArucoTracker:
         Raises MtmError, which names markers of other dictionaries that are there instead, when no marker is found, and
         when the size of the picture changes.
         """
-        ways = (False, True) if self._mirrored is None else (self._mirrored,)
-        followers = {way: MarkerFollower(self._dictionary, mirrored=way) for way in ways}
+        following = self.following()
         kept = _Kept()
         count = 0
         for frame in steady(frames, progress):
             count += 1
-            for follower in followers.values():
-                follower.look(frame)
-            if not any(follower.sightings for follower in followers.values()):
+            following.look(frame)
+            if not following.has_seen:
                 kept.offer(frame.image)
-            elif len(followers) > 1 and (way := _leader(followers)) is not None:
-                followers = {way: followers[way]}
-        # When nothing tells, the picture is most likely as it was taken.
-        self.flipped = max(followers, key=lambda way: (sum(followers[way].decisive.values()), not way))
-        tracks = followers[self.flipped].tracks()
+        self.flipped = following.flipped
+        tracks = following.tracks()
         if not tracks:
             raise MtmError(self._refusal(count, kept.images))
-        if len(followers) > 1 and not followers[self.flipped].decisive:
+        if following.is_undecided:
             self._warn(
                 f"only markers that look the same in a mirror are seen ({_listed(tracks)}), so nothing tells whether "
                 f"the film is mirrored; if it is, name the tracker aruco:{self._dictionary},mirrored"
             )
         self._warn_of_copies(tracks)
         return tracks
+
+    def following(self) -> "ArucoFollowing":
+        """What follows the markers from frame to frame."""
+        return ArucoFollowing(self._dictionary, (False, True) if self._mirrored is None else (self._mirrored,))
 
     def _refusal(self, count: int, images: list[Image]) -> str:
         instead = shown_instead(images, self._dictionary)
@@ -103,6 +102,57 @@ class ArucoTracker:
                         f"the marker {name.removeprefix('marker')} is in sight {len(copies)} times: {name} is the one "
                         f"that moves most, {' and '.join(others)} what hangs elsewhere; cover that, or use --assign"
                     )
+
+
+class ArucoFollowing:
+    """Follows markers in the pictures as they are, mirrored, or both ways until one leads."""
+
+    pixels: Literal["gray", "bgr"] = "gray"
+
+    def __init__(self, dictionary: str, ways: tuple[bool, ...]) -> None:
+        self._followers = {way: MarkerFollower(dictionary, mirrored=way) for way in ways}
+        self._width_px = 0
+
+    @property
+    def flipped(self) -> bool:
+        """Whether the mirrored way tells more; when nothing tells, the picture is most likely as it was taken."""
+        followers = self._followers
+        return max(followers, key=lambda way: (sum(followers[way].decisive.values()), not way))
+
+    @property
+    def has_seen(self) -> bool:
+        """Whether any marker was seen, one way or the other."""
+        return any(follower.sightings for follower in self._followers.values())
+
+    @property
+    def is_undecided(self) -> bool:
+        """Whether nothing that was seen tells the two ways apart."""
+        return len(self._followers) > 1 and not self._followers[self.flipped].decisive
+
+    def look(self, frame: Frame) -> None:
+        """Find the markers of the next frame."""
+        self._width_px = frame.size[0]
+        for follower in self._followers.values():
+            follower.look(frame)
+        if len(self._followers) > 1 and self.has_seen and (way := _leader(self._followers)) is not None:
+            self._followers = {way: self._followers[way]}
+
+    def tracks(self) -> list[Track]:
+        """One track per marker, as `ArucoTracker.track` has them."""
+        return self._followers[self.flipped].tracks()
+
+    def latest(self) -> dict[str, tuple[float, float]]:
+        """Where markers are in the last frame, in the picture as it came."""
+        way = self.flipped
+        found = self._followers[way].latest()
+        if not way:
+            return found
+        return {name: (self._width_px - 1 - column, row) for name, (column, row) in found.items()}
+
+    def forget(self, before_s: float) -> None:
+        """Drop what was seen before then."""
+        for follower in self._followers.values():
+            follower.forget(before_s)
 
 
 class _Kept:

@@ -5,6 +5,7 @@ do not add up from picture to picture, and a turn or a change of scale leaves th
 apart afterwards, when the tracks are known.
 """
 
+from bisect import bisect_left
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -30,7 +31,10 @@ FEW = 20  # points that tell whether it does
 
 @dataclass(frozen=True)
 class Key:
-    """A key picture: its gray image, `points` (n, 2) in it, and the homography (3, 3) from it to the first picture."""
+    """A key picture: its gray image, `points` (n, 2) in it, and the homography (3, 3) from it to the first picture.
+
+    `row` is its frame's number, -1 where that is not kept any more.
+    """
 
     row: int
     image: Image
@@ -92,6 +96,30 @@ class BackgroundFollower:
         else:
             self._find(image, coarse, frame.time_s)
         self._coarse, self._looked_s = coarse, frame.time_s
+
+    def forget(self, before_s: float) -> None:
+        """Drop the frames that are older than `before_s`, and the key pictures that no other frame is compared with.
+
+        A key picture whose own frame is dropped has the row -1.
+        """
+        count = bisect_left(self.times_s, before_s)
+        kept = [look for look in self.looks if look.row >= count]
+        first = kept[0].key if kept else max(len(self.keys) - 1, 0)
+        self.looks = [replace(look, row=look.row - count, key=look.key - first) for look in kept]
+        if self.keys:
+            onto_first = np.linalg.inv(self.keys[first].to_first)
+            self.keys = [
+                replace(key, row=max(key.row - count, -1), to_first=onto_first @ key.to_first)
+                for key in self.keys[first:]
+            ]
+        del self.times_s[:count]
+
+    def until(self, end_s: float) -> "BackgroundFollower":
+        """What was seen before `end_s`, without the pictures: enough for the camera's path, and no more can follow."""
+        count = bisect_left(self.times_s, end_s)
+        looks = [look for look in self.looks if look.row < count]
+        keys = [replace(key, image=np.empty((0, 0), np.uint8)) for key in self.keys if key.row < count]
+        return BackgroundFollower(self.is_needed, keys, looks, self.times_s[:count], self.size)
 
     def _is_where_it_was(self, image: Image) -> bool:
         """Whether a few points lie where they were when the camera last moved."""

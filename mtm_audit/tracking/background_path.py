@@ -73,8 +73,10 @@ class _Bodies:
         self._radii_px = [0.5 * (track.extent_px or usual_px) for track in tracks]
 
     def cover(self, row: int, points: Floats) -> Bools:
-        """Which of the points (n, 2) lie on a body in that frame."""
+        """Which of the points (n, 2) lie on a body in that frame; none where the frame is not kept, row -1."""
         covered = np.zeros(len(points), dtype=np.bool_)
+        if row < 0:
+            return covered
         for places, radius_px in zip(self._places, self._radii_px, strict=True):
             if np.isfinite(places[row, 0]):
                 covered |= np.sum((points - places[row]) ** 2, axis=1) < radius_px**2

@@ -34,19 +34,54 @@ class CentroidTracker:
 
     def track(self, frames: Iterable[Frame], progress: Progress | None = None) -> list[Track]:
         """One track in pixels with y up; raises MtmError when the colour is never seen or the picture changes size."""
-        gather = Gather()
-        place: tuple[float, float] | None = None
+        following = self.following()
         for frame in steady(frames, progress):
-            gather.next_frame(frame)
-            place = (self._near(frame.image, place) if place else None) or _centroid(frame.image, self._cover)
-            if place is not None:
-                gather.put(self._name, *place)
-        if not gather.seen:
+            following.look(frame)
+        tracks = following.tracks()
+        if not tracks:
             raise MtmError(
-                f"nothing of the colour {self._colour} found in {len(gather.times_s)} frames; name the colour that the "
+                f"nothing of the colour {self._colour} found in {following.frames} frames; name the colour that the "
                 "robot has in the picture, for instance as #rrggbb"
             )
-        return gather.tracks(with_headings=False)
+        return tracks
+
+    def following(self) -> "CentroidFollowing":
+        """What follows the colour from frame to frame."""
+        return CentroidFollowing(self._cover, self._reach_px, self._name)
+
+
+class CentroidFollowing:
+    """Follows one thing of a colour, as `CentroidTracker` has it."""
+
+    pixels: Literal["gray", "bgr"] = "bgr"
+    flipped = False
+
+    def __init__(self, cover: Cover, reach_px: int, name: str) -> None:
+        self._cover, self._reach_px, self._name = cover, reach_px, name
+        self._gather = Gather()
+        self.frames = 0
+        self._place: tuple[float, float] | None = None
+
+    def look(self, frame: Frame) -> None:
+        """Find the colour in the next frame."""
+        self.frames += 1
+        self._gather.next_frame(frame)
+        near = self._near(frame.image, self._place) if self._place else None
+        self._place = near or _centroid(frame.image, self._cover)
+        if self._place is not None:
+            self._gather.put(self._name, *self._place)
+
+    def tracks(self) -> list[Track]:
+        """One track; none when the colour was never seen."""
+        return self._gather.tracks(with_headings=False)
+
+    def latest(self) -> dict[str, tuple[float, float]]:
+        """Where the colour is in the last frame."""
+        return self._gather.latest()
+
+    def forget(self, before_s: float) -> None:
+        """Drop what was seen before then."""
+        self._gather.forget(before_s)
 
     def _near(self, image: Image, place: tuple[float, float]) -> tuple[float, float] | None:
         left, top = (max(round(coordinate) - self._reach_px, 0) for coordinate in place)

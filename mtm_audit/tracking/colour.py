@@ -48,37 +48,79 @@ class ColourTracker:
 
         Raises MtmError when none of the colours is found or the size of the picture changes.
         """
-        gather = Gather()
-        windows: dict[str, Window] = {}
-        covers = {name: DriftingCover(name) for name in self._colours}
-        lost = dict.fromkeys(self._colours, 0)
-        areas: dict[str, list[float]] = {name: [] for name in self._colours}
-        for number, frame in enumerate(steady(frames, progress)):
-            gather.next_frame(frame)
-            for name, cover in covers.items():
-                window = windows.pop(name, None)
-                patch = _patch(frame.image, cover, window) if window and number % self._search_every else None
-                if patch is None and _is_looked_for(lost[name]):
-                    patch = _searched(frame.image, cover, thoroughly=lost[name] % THOROUGH_EVERY == 0)
-                lost[name] = 0 if patch else lost[name] + 1
-                if patch is not None:
-                    column, row, area, windows[name] = patch
-                    gather.put(name, column, row, extent_px=BODY_EXTENTS * float(np.sqrt(area)))
-                    areas[name].append(area)
-                    if number % LEARNT_EVERY == 0:
-                        near = np.ascontiguousarray(frame.image[windows[name]][::2, ::2])
-                        cover.learn(near, cover(near))
-        if not gather.seen:
+        following = self.following()
+        for frame in steady(frames, progress):
+            following.look(frame)
+        tracks = following.tracks()
+        if not tracks:
             raise MtmError(
-                f"none of {', '.join(self._colours)} found in {len(gather.times_s)} frames; name the colour that the "
+                f"none of {', '.join(self._colours)} found in {following.frames} frames; name the colour that the "
                 "robot has in the picture, for instance as #rrggbb"
             )
-        for name, sightings in gather.seen.items():
-            least = self._least_share * float(np.median(areas[name]))
-            for row_number, area in zip(list(sightings), areas[name], strict=True):
-                if area < least:
-                    del sightings[row_number]
-        return gather.tracks(with_headings=False)
+        return tracks
+
+    def following(self) -> "ColourFollowing":
+        """What follows the patches from frame to frame."""
+        return ColourFollowing(self._colours, self._search_every, self._least_share)
+
+
+class ColourFollowing:
+    """Follows the largest patch of each colour, as `ColourTracker` has it."""
+
+    pixels: Literal["gray", "bgr"] = "bgr"
+    flipped = False
+
+    def __init__(self, colours: tuple[str, ...], search_every: int, least_share: float) -> None:
+        self.frames = 0
+        self._search_every, self._least_share = search_every, least_share
+        self._gather = Gather()
+        self._windows: dict[str, Window] = {}
+        self._covers = {name: DriftingCover(name) for name in colours}
+        self._lost = dict.fromkeys(colours, 0)
+        # By frame's time, of those that are kept.
+        self._areas: dict[str, dict[float, float]] = {name: {} for name in colours}
+
+    def look(self, frame: Frame) -> None:
+        """Find the patches of the next frame."""
+        number = self.frames
+        self.frames += 1
+        self._gather.next_frame(frame)
+        for name, cover in self._covers.items():
+            window = self._windows.pop(name, None)
+            patch = _patch(frame.image, cover, window) if window and number % self._search_every else None
+            if patch is None and _is_looked_for(self._lost[name]):
+                patch = _searched(frame.image, cover, thoroughly=self._lost[name] % THOROUGH_EVERY == 0)
+            self._lost[name] = 0 if patch else self._lost[name] + 1
+            if patch is not None:
+                column, row, area, self._windows[name] = patch
+                self._gather.put(name, column, row, extent_px=BODY_EXTENTS * float(np.sqrt(area)))
+                self._areas[name][frame.time_s] = area
+                if number % LEARNT_EVERY == 0:
+                    near = np.ascontiguousarray(frame.image[self._windows[name]][::2, ::2])
+                    cover.learn(near, cover(near))
+
+    def tracks(self) -> list[Track]:
+        """One track per colour that was found."""
+        whole = Gather(self._gather.height_px, self._gather.times_s, {}, self._gather.extents_px)
+        for name, sightings in self._gather.seen.items():
+            areas = list(self._areas[name].values())
+            least = self._least_share * float(np.median(areas))
+            whole.seen[name] = {
+                row: place for (row, place), area in zip(sightings.items(), areas, strict=True) if area >= least
+            }
+        return whole.tracks(with_headings=False)
+
+    def latest(self) -> dict[str, tuple[float, float]]:
+        """Where the patches are in the last frame."""
+        return self._gather.latest()
+
+    def forget(self, before_s: float) -> None:
+        """Drop what was seen before then."""
+        self._gather.forget(before_s)
+        self._areas = {
+            name: {time_s: area for time_s, area in areas.items() if time_s >= before_s}
+            for name, areas in self._areas.items()
+        }
 
 
 def _is_looked_for(lost: int) -> bool:

@@ -1,6 +1,7 @@
 """Following markers from picture to picture, each copy of a marker by its continuity."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,8 @@ _COPIES = "bcdefghijklmnopqrstuvwxyz"
 
 # A marker's number, and which of its copies: 0, 1 and so on in the order of their appearance.
 Copy = tuple[int, int]
+# Where the copies were seen, by their keys and the numbers of frames.
+Seen = dict[str, dict[int, tuple[float, float, float]]]
 
 
 @dataclass(frozen=True)
@@ -90,13 +93,25 @@ class MarkerFollower:
         """One track per marker that was seen often enough, named `marker<number>`.
 
         Of copies that show at once the one that goes farthest has that name, the next `marker<number>b` and so on.
+        More frames may follow.
         """
-        names = self._names()
-        seen = {copy: self._gather.seen[_key(copy)] for copy in names}
-        often = {copy: name for copy, name in names.items() if len(seen[copy]) >= SEEN_AT_LEAST}
-        self._gather.seen = {name: seen[copy] for copy, name in often.items()}
-        self._gather.extents_px = {name: self._gather.extents_px[_key(copy)] for copy, name in often.items()}
-        return self._gather.tracks(with_headings=True)
+        seen = {key: dict(places) for key, places in self._gather.seen.items()}
+        often = {copy: name for copy, name in self._names(seen).items() if len(seen[_key(copy)]) >= SEEN_AT_LEAST}
+        named = Gather(
+            self._gather.height_px,
+            self._gather.times_s,
+            {name: seen[_key(copy)] for copy, name in often.items()},
+            {name: self._gather.extents_px[_key(copy)] for copy, name in often.items()},
+        )
+        return named.tracks(with_headings=True)
+
+    def latest(self) -> dict[str, tuple[float, float]]:
+        """Column and row of each marker in the last frame, as it was looked at; of several copies one."""
+        return {f"marker{key.partition('/')[0]}": place for key, place in self._gather.latest().items()}
+
+    def forget(self, before_s: float) -> None:
+        """Drop what was seen before then."""
+        self._gather.forget(before_s)
 
     def _continued(self, image: Image, time_s: float) -> dict[Copy, Sighting]:
         """The markers whose sides are where they are expected and as long as before; they were read a moment ago."""
@@ -177,18 +192,17 @@ class MarkerFollower:
         if not reads_in_a_mirror(self._dictionary, sighting.number):
             self.decisive[sighting.number] += 1
 
-    def _names(self) -> dict[Copy, str]:
+    def _names(self, seen: Seen) -> dict[Copy, str]:
         names: dict[Copy, str] = {}
         for number in {number for number, _ in self._followed}:
-            self._join(number)
-            copies = [copy for copy in self._followed if copy[0] == number and _key(copy) in self._gather.seen]
-            copies.sort(key=self._reach_px, reverse=True)
+            self._join(number, seen)
+            copies = [copy for copy in self._followed if copy[0] == number and _key(copy) in seen]
+            copies.sort(key=lambda copy: _reach_px(seen[_key(copy)]), reverse=True)
             names |= {copy: f"marker{number}{letter}" for copy, letter in zip(copies, ["", *_COPIES], strict=False)}
         return names
 
-    def _join(self, number: int) -> None:
+    def _join(self, number: int, seen: Seen) -> None:
         """Make copies one that never show in the same frame: a marker that leapt."""
-        seen = self._gather.seen
         copies = [_key(copy) for copy in self._followed if copy[0] == number]
         for place, later in enumerate(copies):
             for earlier in copies[:place]:
@@ -196,9 +210,9 @@ class MarkerFollower:
                     seen[earlier] |= seen.pop(later)
                     break
 
-    def _reach_px(self, copy: Copy) -> float:
-        places = np.array(list(self._gather.seen[_key(copy)].values()))[:, :2]
-        return float(np.ptp(places, axis=0).max())
+
+def _reach_px(places: Mapping[int, tuple[float, float, float]]) -> float:
+    return float(np.ptp(np.array(list(places.values()))[:, :2], axis=0).max())
 
 
 def _key(copy: Copy) -> str:

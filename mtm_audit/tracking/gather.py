@@ -1,5 +1,6 @@
 """Collecting what a tracker sees, frame by frame, into tracks."""
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
@@ -37,6 +38,23 @@ class Gather:
         self.extents_px[name] = max(extent_px, self.extents_px.get(name, 0.0))
         self.seen.setdefault(name, {})[len(self.times_s) - 1] = (column, self.height_px - 1 - row, heading_rad)
 
+    def latest(self) -> dict[str, tuple[float, float]]:
+        """Column and row (y down) of each body that was seen in the current frame."""
+        row = len(self.times_s) - 1
+        here = {name: places[row] for name, places in self.seen.items() if row in places}
+        return {name: (place[0], self.height_px - 1 - place[1]) for name, place in here.items()}
+
+    def forget(self, before_s: float) -> None:
+        """Drop the frames that are older than `before_s`, and the bodies seen in none of the others."""
+        count = bisect_left(self.times_s, before_s)
+        del self.times_s[:count]
+        kept = {
+            name: {row - count: place for row, place in places.items() if row >= count}
+            for name, places in self.seen.items()
+        }
+        self.seen = {name: places for name, places in kept.items() if places}
+        self.extents_px = {name: extent_px for name, extent_px in self.extents_px.items() if name in self.seen}
+
     def tracks(self, with_headings: bool) -> list[Track]:
         """One track per body, in the order of their names; NaN and not valid in frames in which it was not seen."""
         times_s = np.asarray(self.times_s, dtype=np.float64)
@@ -60,12 +78,17 @@ def steady(frames: Iterable[Frame], progress: Progress | None = None) -> Iterato
     """
     size: tuple[int, int] | None = None
     for count, frame in enumerate(frames, 1):
-        if size is not None and frame.size != size:
-            raise MtmError(
-                f"the picture changes from {size[0]} x {size[1]} to {frame.size[0]} x {frame.size[1]} at "
-                f"{frame.time_s:.3f} s; cut the video there and decode the parts one by one"
-            )
+        check_size(frame, size)
         size = frame.size
         yield frame
         if progress is not None:
             progress(count)
+
+
+def check_size(frame: Frame, size: tuple[int, int] | None) -> None:
+    """Raise MtmError when the frame is not of that size, since pixels would then change their meaning."""
+    if size is not None and frame.size != size:
+        raise MtmError(
+            f"the picture changes from {size[0]} x {size[1]} to {frame.size[0]} x {frame.size[1]} at "
+            f"{frame.time_s:.3f} s; cut the video there and decode the parts one by one"
+        )

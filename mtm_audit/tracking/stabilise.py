@@ -39,9 +39,23 @@ def stabilised_tracks(
     tracks = tracker.track(_looked_at(frames, seen), progress)
     if keep is not None:
         keep(Pictured(tuple(tracks), seen.size, is_flipped(tracker)))
+    return without_camera(tracks, seen, reference, is_flipped(tracker), warn)
+
+
+def without_camera(
+    tracks: list[Track],
+    seen: BackgroundFollower,
+    reference: Sequence[str] = (),
+    flipped: bool = False,
+    warn: Callable[[str], None] | None = None,
+) -> list[Track]:
+    """Tracks with the camera's own motion taken out, as far as the background `seen` beside them tells it.
+
+    They are of mirrored pictures when `flipped`; the rest is as `stabilised_tracks` has it.
+    """
     if any(track.unit != "px" for track in tracks):
         return tracks
-    path = _path(seen, tracks, reference, is_flipped(tracker))
+    path = _path(seen, tracks, reference, flipped)
     if path is None or path.is_still(tracks):
         return tracks
     if warn is not None:

@@ -15,8 +15,11 @@ from hil.sensors.poses import Trajectory
 from hil.sensors.scene import Scene
 from hil.sensors.video import write_video
 from mtm_audit.ingest.load import load_tracks
+from mtm_audit.live.films import FilmSource
+from mtm_audit.live.watching import Film
 from mtm_audit.model.picture import Frame
 from mtm_audit.readers.video import read_frames
+from mtm_audit.tracking.following import following
 from mtm_audit.tracking.registry import tracker
 
 pytestmark = pytest.mark.benchmark(timer=time.process_time)
@@ -87,6 +90,26 @@ def test_tracking_1080p60_costs_little_beside_decoding(tmp_path, benchmark):
         benchmark.extra_info["times_bare_decoding"] = round(ratio, 2)
         print(f"\naruco: {ratio:.2f} times bare decoding at 1920 x 1080, 60 Hz, four robots")
         assert ratio < 2.2
+
+
+def test_watching_720p_takes_at_most_a_third_of_one_core(tmp_path, benchmark):
+    camera = Camera(optics=overhead(width_px=1280, height_px=720), blur_px=0.5)
+    write_video(film(camera, Scene(), four_robots(), np.random.default_rng(1)), tmp_path / "film.mp4")
+
+    def watched():
+        film = Film(following("aruco"))
+        for frame in FilmSource(tmp_path / "film.mp4", "gray", patience_s=0.0).events():
+            film.put(frame)
+            film.following.latest()
+        return film.seen(0.0, SECONDS).tracks
+
+    tracks = benchmark.pedantic(watched, rounds=3)
+    assert [track.valid.all() for track in tracks] == [True] * 4
+    if benchmark.enabled:
+        ratio = SECONDS / benchmark.stats.stats.min
+        benchmark.extra_info["times_real_time"] = round(ratio, 1)
+        print(f"\nwatching: {ratio:.1f} times real time at 1280 x 720, 30 Hz, four robots")
+        assert ratio >= 3
 
 
 def test_a_lost_colour_costs_at_most_three_times_a_seen_one(tmp_path, benchmark):

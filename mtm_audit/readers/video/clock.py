@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from av.video.stream import VideoStream
 
 # Streams without a container have no times, and the library says 25 pictures a second of all of them.
-_WITHOUT_TIMES = frozenset(
+WITHOUT_TIMES = frozenset(
     {
         "av1",
         "cavsvideo",
@@ -131,7 +131,7 @@ def clock_of(
         return EvenClock(frame_rate_hz)
     if container.format.name == "avi":
         return OrderClock(stream.codec_context.reorder_depth)
-    if container.format.name not in _WITHOUT_TIMES:
+    if container.format.name not in WITHOUT_TIMES:
         return StatedClock()
     stated = stream.codec_context.framerate
     if not stated:

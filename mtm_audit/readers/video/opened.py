@@ -34,7 +34,7 @@ def opened_video(path: Path) -> Iterator[tuple["InputContainer", "VideoStream"]]
         ) from error
     try:
         with container:
-            stream = _film_of(path, container)
+            stream = film_of(path, container)
             # Damage is to stop the decoder: pictures that it patches up look plausible and are wrong.
             stream.codec_context.options = {"err_detect": "explode"}
             stream.thread_type = "AUTO"
@@ -61,8 +61,11 @@ def _reason(error: Exception) -> str:
     return " ".join(str(error).split())[:160] or type(error).__name__
 
 
-def _film_of(path: Path, container: "InputContainer") -> "VideoStream":
-    """The first stream that is no still picture: drones and cutters put a cover into the file, often first."""
+def film_of(path: Path | str, container: "InputContainer") -> "VideoStream":
+    """The first stream that is no still picture: drones and cutters put a cover into the file, often first.
+
+    Raises MtmError, which names `path`, when there is none.
+    """
     streams = container.streams.video
     if not streams:
         raise MtmError(f"{path} holds no video stream; name a file with pictures in it")

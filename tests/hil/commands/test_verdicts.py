@@ -51,3 +51,23 @@ def test_power_prints_the_smallest_message_that_is_decoded(tmp_path, capsys, mon
         capsys.readouterr().out
     )
     assert (tmp_path / "a.csv").read_text().count("\n") == 4 + 1 + 3 * 12
+
+
+def test_watched_counts_the_verdicts_on_silent_streams(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("hil.experiments.verdicts.watched.SECONDS", 3.0)
+    assert run(*quick(tmp_path, "watched")) == 0
+    _, _, head, row = (tmp_path / "a.csv").read_text().splitlines()
+    counts = dict(zip(head.split(","), row.split(","), strict=True))
+    assert (counts["streams"], counts["decoded"]) == ("4", "0")
+    assert int(counts["looks"]) > int(counts["weighed"]) >= 4
+    assert "4 silent streams" in capsys.readouterr().out
+
+
+def test_a_watch_of_the_experiment_would_find_a_message():
+    from hil.experiments.verdicts.watched import Tally, watch_track
+    from tests.audit.moving_robot import key_of, robot_track, scheme_of
+
+    key, tally = key_of(scheme_of(symbols=(1,), ticks=200)), Tally()
+    watch = watch_track(robot_track(key, "robot0", (2,), 8.0, onset_s=1.0, rate_hz=25.0), key, 60.0, tally)
+    assert watch.best.decoding.message == 2
+    assert tally.verdicts == {"decoded": 1}
