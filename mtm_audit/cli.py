@@ -416,7 +416,7 @@ def batch(
         )  # fmt: skip
         speed = None if shared["search_speed"] else 1.0 if shared["speed"] is None else shared["speed"]
         plan = Plan(
-            keys=named_keys(key, revoked), settings=settings, tracker=shared["tracker"],
+            keys=named_keys(key, revoked), settings=settings, tracker=shared["tracker"] or _TRACKER,
             reference=_names(shared["reference"]), reading=reading, frame_rate_hz=shared["frame_rate"], speed=speed,
             cache=None if cache is None else cache.absolute(),
         )  # fmt: skip

@@ -18,9 +18,7 @@ from mtm_audit.batch.results import check_results
 from mtm_audit.batch.row import UNREADABLE
 from mtm_audit.batch.run import Batched, Where, run_batch
 from mtm_audit.batch.trackcache import TrackCache, usual_folder
-from mtm_audit.decoding.speeds import check_speed
-from mtm_audit.detectors import make_detector
-from mtm_audit.tracking.registry import tracker
+from mtm_audit.commands.decode_values import check_decode_values
 from mtm_onboard.protocol.key import load_key
 
 _VERDICTS = ("decoded", "inconclusive", "absent", UNREADABLE)
@@ -45,9 +43,7 @@ def run_batch_command(options: BatchOptions) -> int:
     """
     plan = options.plan
     check_results(options.out, force=options.force)
-    make_detector(plan.settings.detector, plan.settings.profile)
-    tracker(plan.tracker)
-    check_speed(1.0 if plan.speed is None else plan.speed)
+    check_decode_values(plan.settings, plan.tracker, plan.speed, plan.frame_rate_hz)
     TrackCache(plan.cache or usual_folder()).check()
     _warn_of_keys(plan)
     found = find_recordings(options.paths, options.out)

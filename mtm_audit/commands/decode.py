@@ -10,15 +10,14 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress
 
+from mtm_audit.commands.decode_values import check_decode_values
 from mtm_audit.commands.opened_key import KeySource, OpenedKey, opened_key
 from mtm_audit.commands.several import check_together, run_each
 from mtm_audit.commands.unused import unused_options
 from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.decoding.recorded import decode_recording, recorded_of
 from mtm_audit.decoding.settings import DecodeSettings
-from mtm_audit.decoding.speeds import check_speed
 from mtm_audit.decoding.together import decode_together
-from mtm_audit.detectors import make_detector
 from mtm_audit.ingest.films import film_length
 from mtm_audit.ingest.recording import read_recording
 from mtm_audit.ingest.source import Source, recordings_of, sources_of
@@ -26,15 +25,12 @@ from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.recording import Recording
 from mtm_audit.model.stage import StageError, stage
 from mtm_audit.readers.logs.options import ReadOptions
-from mtm_audit.readers.video.clock import EvenClock
 from mtm_audit.reporting.json_report import json_report
 from mtm_audit.reporting.overlay.files import OverlayFiles, check_pictures, draw_overlay
 from mtm_audit.reporting.remarks import remarks
 from mtm_audit.reporting.report.provenance import ReportRequest
 from mtm_audit.reporting.stages import Stage, stages_of_decoding, stages_of_recording, text_of_stages
 from mtm_audit.reporting.text import print_report
-from mtm_audit.tracking.registry import tracker
-from mtm_onboard.protocol.errors import command_line_values
 from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.output_file import check_outputs
 
@@ -103,12 +99,7 @@ def run_decode(options: DecodeOptions) -> int:
 
 def _check(options: DecodeOptions) -> None:
     """Refuse what would fail after the long work."""
-    make_detector(options.settings.detector, options.settings.profile)
-    with command_line_values():
-        tracker(options.tracker)
-        check_speed(1.0 if options.speed is None else options.speed)
-        if options.frame_rate_hz is not None:
-            EvenClock(options.frame_rate_hz)
+    check_decode_values(options.settings, options.tracker, options.speed, options.frame_rate_hz)
     page = None if options.report is None else options.report.path
     check_outputs("mtm-audit decode", options.plot, page, *options.overlay.paths, force=options.force)
     if options.plot is not None:
