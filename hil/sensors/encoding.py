@@ -25,6 +25,8 @@ class Encoding:
         stream.width, stream.height = size
         stream.pix_fmt = self.pixel_format
         stream.options = dict(self.options)
+        # With more threads, whose number goes by the machine, the encoder comes to other decisions.
+        stream.codec_context.thread_count = 1
         if self.bits_per_pixel is not None:
             stream.bit_rate = round(self.bits_per_pixel * size[0] * size[1] * rate_hz)
         if self.key_every_s is not None:

@@ -20,6 +20,7 @@ WINDOW_PX, PATCH_PX, LEVELS = 19, 36, 1
 # The least eigenvalue, by OpenCV's scale, of a patch that noise of two gray levels moves by less than 0.2 px.
 LEAST_EIGENVALUE = 1.7e-5
 COARSE_WIDTH_PX = 320
+LEAST_AGREEING = 0.4  # of the points that are followed in coarse pictures
 RANSAC_PX = 0.6
 LEAST_POINTS = 12
 LEAST_SHARE = 0.5  # of a key picture's points; with fewer in sight a new key picture is taken
@@ -93,9 +94,10 @@ class BackgroundFollower:
         coarse = _coarse(image)
         if not self.keys:
             self._take_key(image, np.eye(3), frame.time_s)
-        else:
-            self._find(image, coarse, frame.time_s)
-        self._coarse, self._looked_s = coarse, frame.time_s
+            self._coarse = coarse
+        elif self._find(image, coarse, frame.time_s):
+            self._coarse = coarse
+        self._looked_s = frame.time_s
 
     def forget(self, before_s: float) -> None:
         """Drop the frames that are older than `before_s`, and the key pictures that no other frame is compared with.
@@ -140,44 +142,50 @@ class BackgroundFollower:
         self.looks.append(Look(len(self.times_s) - 1, len(self.keys) - 1, places))
         self._moved_s = time_s
 
-    def _find(self, image: Image, coarse: Image, time_s: float) -> None:
+    def _find(self, image: Image, coarse: Image, time_s: float) -> bool:
+        """Whether the camera's motion is found; where it is not, it is looked for from the same picture on."""
         key = self.keys[-1]
-        expected = self._coarse_step(coarse) @ self._motion
+        step = self._coarse_step(coarse)
+        expected = self._motion if step is None else step @ self._motion
         places = _patches(key, image, expected).found(image)
         found = np.isfinite(places[:, 0])
         motion = homography(key.points[found], places[found]) if found.sum() >= LEAST_POINTS else None
         if motion is None:
             # Nothing agrees: what is before the camera now is another scene, or a blur; the next frames tell.
-            self._motion = expected
             self._moved_s = time_s
-            if _share_inside(key.points, expected, self.size) < LEAST_SHARE:
+            is_out_of_sight = _share_inside(key.points, expected, self.size) < LEAST_SHARE
+            if is_out_of_sight:
                 self._take_key(image, key.to_first @ np.linalg.inv(expected), time_s)
-            return
+            return is_out_of_sight
         if _step_px(key.points, self._motion, motion) > STILL_PX:
             self._moved_s = time_s
         self._motion = motion
         self.looks.append(Look(len(self.times_s) - 1, len(self.keys) - 1, places))
         if _share_inside(key.points, motion, self.size) < LEAST_SHARE:
             self._take_key(image, key.to_first @ np.linalg.inv(motion), time_s)
+        return True
 
-    def _coarse_step(self, coarse: Image) -> Floats:
-        """The homography from the last picture looked at to this one, to a pixel or two."""
+    def _coarse_step(self, coarse: Image) -> Floats | None:
+        """The homography from the last picture whose motion is known to this one, to a pixel or two.
+
+        None when too few points agree on one.
+        """
         assert self._coarse is not None
         scale = self.size[0] / coarse.shape[1]
         points = cv2.perspectiveTransform(self.keys[-1].points[None], self._motion)[0] / scale
         inside = np.all((points > 4) & (points < np.array(coarse.shape[::-1]) - 5), axis=1)
         start = points[inside].astype(np.float32)
         if len(start) < LEAST_POINTS:
-            return np.eye(3)
+            return None
         after, status, _ = cv2.calcOpticalFlowPyrLK(
             self._coarse, coarse, start, start.copy(), winSize=(15, 15), maxLevel=3
         )
         good = status.ravel() == 1
         if good.sum() < LEAST_POINTS:
-            return np.eye(3)
-        step, _ = cv2.estimateAffinePartial2D(start[good], after[good], ransacReprojThreshold=1.0)
-        if step is None:
-            return np.eye(3)
+            return None
+        step, agreeing = cv2.estimateAffinePartial2D(start[good], after[good], ransacReprojThreshold=1.0)
+        if step is None or agreeing.sum() < LEAST_AGREEING * good.sum():
+            return None
         step[:, 2] *= scale
         return np.vstack([step, [0.0, 0.0, 1.0]])
 

@@ -11,14 +11,13 @@ from mtm_audit.tracking.camera_path import CameraPath, about_the_middle, bridged
 
 # Of the picture that the points must surround: what all lies in one corner may be a single thing that moves.
 LEAST_AREA = 0.1
-LEAST_KNOWN = 0.8
 # A body of unknown size is taken for so much of the picture's width.
 USUAL_EXTENT = 0.08
 LONGEST_GAP_S = 1.6 * GLANCE_S
 
 
 def background_path(seen: BackgroundFollower, tracks: Sequence[Track], flipped: bool) -> CameraPath | None:
-    """How the camera moved by the background; None where the picture shows too little of one.
+    """How the camera moved by the background, where it shows; None where the picture shows too little of one.
 
     `tracks` are in pixels with y up, of mirrored pictures when `flipped`.
     """
@@ -53,8 +52,7 @@ def background_path(seen: BackgroundFollower, tracks: Sequence[Track], flipped: 
     to_reference = about_the_middle(to_tracks @ to_first @ np.linalg.inv(to_tracks))
     # Eight numbers are fitted to two coordinates a point.
     noise_px = float(np.median(np.array(noises_px) * np.sqrt(4.0 / np.array(counts))))
-    path = CameraPath(to_reference, noise_px, f"{int(np.median(counts))} points of the background")
-    return path if path.known >= LEAST_KNOWN else None
+    return CameraPath(to_reference, noise_px, f"{int(np.median(counts))} points of the background")
 
 
 def track_frame(size: tuple[int, int], flipped: bool) -> Floats:

@@ -27,6 +27,12 @@ class CameraPath:
         """The share of the frames of which the motion is known."""
         return float(np.mean(np.isfinite(self.to_reference[:, 0, 0])))
 
+    def unknown_s(self, times_s: Floats) -> tuple[tuple[float, float], ...]:
+        """First and last time of each stretch of frames, at `times_s`, of which the motion is unknown."""
+        unknown = np.concatenate([[False], ~np.isfinite(self.to_reference[:, 0, 0]), [False]])
+        edges = np.flatnonzero(np.diff(unknown.astype(np.int8)))
+        return tuple((float(times_s[first]), float(times_s[after - 1])) for first, after in edges.reshape(-1, 2))
+
     def motion_px(self, tracks: Sequence[Track]) -> float:
         """The rms shift of the pictures where the tracks are, in each direction, about its mean."""
         middles = np.array([np.median(track.positions[track.valid], axis=0) for track in tracks if track.valid.any()])

@@ -6,7 +6,7 @@ import numpy as np
 
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.pictured import Pictured
-from mtm_audit.model.track import Track
+from mtm_audit.model.track import Floats, Track
 from mtm_audit.tracking.background import BackgroundFollower
 from mtm_audit.tracking.background_path import background_path
 from mtm_audit.tracking.camera_path import CameraPath
@@ -16,6 +16,8 @@ from mtm_audit.tracking.registry import Tracker, in_picture, is_flipped
 
 # What stands still for the background may move by so much of the camera's motion, or so many pixels.
 AGREEING, AGREEING_PX = 0.1, 0.3
+MOST_NAMED = 3  # of the stretches in which the camera's motion is unknown
+LEAST_KNOWN = 0.8  # of the frames; a path of which less is known is not taken out
 LEAST_WHOLE = 0.98  # of the frames must show enough of it
 
 
@@ -55,11 +57,13 @@ def without_camera(
     """
     if any(track.unit != "px" for track in tracks):
         return tracks
-    path = _path(seen, tracks, reference, flipped)
+    path = _path(seen, tracks, reference, flipped, warn or (lambda sentence: None))
     if path is None or path.is_still(tracks):
         return tracks
     if warn is not None:
         warn(f"the camera moved by {path.motion_px(tracks):.2g} px rms; that was taken out by {path.source}")
+        if path.known < 1.0:
+            warn(_unknown(path, tracks[0].times_s))
     return [path.applied(track) for track in tracks]
 
 
@@ -78,21 +82,42 @@ def unstabilised_tracks(
 
 
 def _path(
-    seen: BackgroundFollower, tracks: Sequence[Track], reference: Sequence[str], flipped: bool
+    seen: BackgroundFollower,
+    tracks: Sequence[Track],
+    reference: Sequence[str],
+    flipped: bool,
+    warn: Callable[[str], None],
 ) -> CameraPath | None:
     if reference:
         return reference_path(chosen_tracks(tracks, reference), seen.size)
     background = background_path(seen, tracks, flipped)
     if background is not None and background.is_still(tracks):
-        return background
+        return background if background.known >= LEAST_KNOWN else None
     still = still_tracks(tracks, seen.size)
-    if background is None:
+    if background is None or background.known < LEAST_KNOWN:
+        if background is not None and not still:
+            warn(
+                f"the camera moved, and how is known in only {background.known:.0%} of the frames, so that it is not "
+                "taken out; keep what stands still in the picture, or name what does with --reference"
+            )
         return reference_path(still, seen.size) if still else None
     agreeing_px = max(AGREEING * background.motion_px(tracks), AGREEING_PX)
     agreeing = [track for track in still if _rms_px(background.applied(track)) < agreeing_px]
     # A path that now and then rests on fewer things leaps whenever one comes or goes.
     enough = np.sum([track.valid for track in agreeing], axis=0) >= FOR_HOMOGRAPHY
     return reference_path(agreeing, seen.size) if np.mean(enough) > LEAST_WHOLE else background
+
+
+def _unknown(path: CameraPath, times_s: Floats) -> str:
+    """That nothing is used of stretches in which the camera's motion is unknown, the longest of them named."""
+    stretches = path.unknown_s(times_s)
+    longest = sorted(stretches, key=lambda stretch: stretch[0] - stretch[1])[:MOST_NAMED]
+    named = ", ".join(f"{first:.1f} to {last:.1f} s" for first, last in sorted(longest))
+    return (
+        f"how the camera moved is not known in {1.0 - path.known:.1%} of the frames "
+        f"({named}{' and elsewhere' if len(stretches) > len(longest) else ''}): nothing is used of them; keep what "
+        "stands still in the picture, or name what does with --reference"
+    )
 
 
 def _rms_px(track: Track) -> float:

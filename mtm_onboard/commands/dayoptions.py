@@ -1,7 +1,10 @@
 """The options that say days, and instants, shared by the commands that make key files."""
 
 import argparse
-from datetime import UTC, date, datetime
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from datetime import date, datetime
 
 
 def add_days(parser: argparse.ArgumentParser, default_days: int) -> None:
@@ -12,22 +15,29 @@ def add_days(parser: argparse.ArgumentParser, default_days: int) -> None:
     parser.add_argument("--days", type=int, default=default_days, metavar="N", help="how many days (%(default)s)")
 
 
-def first_day(args: argparse.Namespace) -> date:
+def first_day(args: argparse.Namespace) -> "date":
     """The first day that was given, or today."""
+    from datetime import UTC, datetime
+
     given: date | None = args.first_day
     return datetime.now(UTC).date() if given is None else given
 
 
-def day(text: str) -> date:
+def day(text: str) -> "date":
     """A day; raises ValueError for other text."""
     return _day(text)
 
 
-def instant(text: str) -> datetime:
+def instant(text: str) -> "datetime":
     """A date and time, in UTC unless it says otherwise; raises ValueError for other text."""
+    from datetime import UTC, datetime
+
     value = datetime.fromisoformat(text)
     return value if value.tzinfo is not None else value.replace(tzinfo=UTC)
 
 
-def _day(text: str) -> date:
+def _day(text: str) -> "date":
+    # No earlier than needed: help is shown without it.
+    from datetime import date
+
     return date.fromisoformat(text)

@@ -1,7 +1,6 @@
 """`mtm-onboard issue`: a robot's or an auditor's file, cut from the master."""
 
 import argparse
-from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,6 +34,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def _issue(args: argparse.Namespace) -> int:
+    from datetime import timedelta
+
     from mtm_onboard.protocol import Key, MtmError, save_key
     from mtm_onboard.protocol.holding import DayHolding, RobotHolding
     from mtm_onboard.protocol.holding_file import check_days

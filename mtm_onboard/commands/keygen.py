@@ -1,7 +1,6 @@
 """`mtm-onboard keygen`: a fresh secret and its scheme: a master, or under a fixed schedule a key of format 1."""
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -140,6 +139,8 @@ def _keygen(args: argparse.Namespace) -> int:
 
 
 def _chosen_scheme(args: argparse.Namespace, given: dict[str, Any]) -> "Scheme":
+    from dataclasses import replace
+
     from mtm_onboard.protocol import Scheme
 
     chosen = {"schedule": "rolling"} | _PRESETS.get(args.preset, {})
@@ -160,6 +161,8 @@ def _chosen_scheme(args: argparse.Namespace, given: dict[str, Any]) -> "Scheme":
 
 def _tagged(args: argparse.Namespace, scheme: "Scheme", asked: dict[str, Any]) -> "Scheme":
     """The scheme with the widest tag that fits beside the payload, or with a number in what a tag leaves over."""
+    from dataclasses import replace
+
     from mtm_onboard.protocol import MtmError
     from mtm_onboard.protocol.framing import payload_bits
 

@@ -1,7 +1,6 @@
 """`mtm-onboard revoke`: a key file that is no longer trusted, such as a stolen robot's, onto the list of those."""
 
 import argparse
-from datetime import UTC, datetime
 from pathlib import Path
 
 from mtm_onboard.commands.dayoptions import instant
@@ -26,6 +25,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def _revoke(args: argparse.Namespace) -> int:
+    from datetime import UTC, datetime
+
     from mtm_onboard.protocol.errors import command_line_values
     from mtm_onboard.protocol.revocation import RevocationList, load_revocations, revoked_entry, save_revocations
 

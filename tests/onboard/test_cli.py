@@ -308,6 +308,14 @@ def test_a_full_disk_and_an_interrupt_get_one_sentence(key, capsys, monkeypatch,
     assert says in error
 
 
+def test_help_loads_nothing_that_it_does_not_need():
+    code = "import sys; from mtm_onboard.cli import main\ntry: main(['--help'])\nfinally: print(*sys.modules)"
+    root = Path(__file__).parents[2]
+    # Without what the environment loads of its own accord.
+    loaded = subprocess.run([sys.executable, "-S", "-c", code], cwd=root, capture_output=True, text=True, check=True)
+    assert not {"numpy", "dataclasses", "inspect", "datetime", "json"} & set(loaded.stdout.split())
+
+
 def test_help_takes_neither_numpy_nor_long():
     code = "import sys; from mtm_onboard.cli import main\ntry: main(['--help'])\nfinally: print('numpy' in sys.modules)"
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.track import Track
 from mtm_audit.readers.formats.c3d import read_c3d, recognises_c3d
@@ -117,8 +119,10 @@ def read_log(path: Path, options: ReadOptions | None = None, warn: Warn | None =
 
     try:
         opening = opening_of(path)
-        log = (format_of(opening) or _likeliest(opening)).read(path, asked, told)
-        tracks = tuple(track_of(body, str(path), told) for body in log.bodies) + log.tracks
+        # Damaged numbers are infinite or none, which is told where they are left out.
+        with np.errstate(all="ignore"):
+            log = (format_of(opening) or _likeliest(opening)).read(path, asked, told)
+            tracks = tuple(track_of(body, str(path), told) for body in log.bodies) + log.tracks
         return Contents(_distinct(path, tracks), log.at)
     except SeveralPosesError as error:
         raise SeveralPosesError(_printable(str(error)), [_printable(name) for name in error.offered]) from error

@@ -17,6 +17,7 @@ import sys
 import tempfile
 import time
 import traceback
+import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -114,7 +115,10 @@ def _set_number(draw: random.Random, data: bytearray) -> None:
 def outcome(path: Path, *, film: bool = False) -> tuple[str, str]:
     """What became of one file, and the traceback if there was one."""
     try:
-        _read_film(path) if film else read_log(path)
+        with warnings.catch_warnings():
+            # A library may warn of what it likes; ours of nothing that is not said in a sentence.
+            warnings.filterwarnings("error", category=RuntimeWarning, module="mtm_audit")
+            _read_film(path) if film else read_log(path)
     except MtmError as error:
         return ("refused", "") if "\n" not in str(error) else ("traceback", f"more than one line: {error}")
     except Exception:

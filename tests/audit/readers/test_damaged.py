@@ -31,6 +31,21 @@ def test_an_undamaged_recording_is_read(tmp_path, name):
     assert outcome(path) == ("read", "")
 
 
+@pytest.mark.parametrize("name", ["tum", "csv", "motive 1.23", "vicon tracker", "qualisys 6d", "kitti", "euroc"])
+def test_numbers_without_an_end_make_no_library_warn(tmp_path, name):
+    path, data = original(name, tmp_path)
+    lines = data.splitlines(keepends=True)
+    separator = next(mark for mark in (b",", b"\t", b" ") if mark in lines[-1])
+    first = next(place for place, line in enumerate(lines) if separator in line and line[:1].isdigit())
+    for row in (first, len(lines) // 2, len(lines) - 1):
+        cells = lines[row].split(separator)
+        for column in range(len(cells) - 1):
+            changed = separator.join([*cells[:column], b"inf", *cells[column + 1 :]])
+            path.write_bytes(b"".join([*lines[:row], changed, *lines[row + 1 :]]))
+            result, text = outcome(path)
+            assert result in ("read", "refused"), text
+
+
 def test_a_reader_that_fails_otherwise_is_told(tmp_path, monkeypatch):
     path, _ = original("tum", tmp_path)
     monkeypatch.setattr("mtm_audit.readers.logs.registry.opening_of", lambda _: 1 / 0)

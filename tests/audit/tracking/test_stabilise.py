@@ -203,6 +203,41 @@ def test_a_reference_that_is_hidden_leaves_frames_unknown():
     assert not path.applied(track).valid[:20].any()
 
 
+def film_with_a_wall(first, last):
+    """A camera that shakes, and that something without texture hides all from in the frames `first` to `last`."""
+    for number, frame in enumerate(film(room(), 6.0, size=90)):
+        image = frame.image
+        if first <= number <= last:
+            column, row = np.rint(shaken(number, 6.0) @ [*(robot_place(number) + 50), 1.0])[:2].astype(int)
+            image = np.full_like(image, 120)
+            around = np.s_[row - 26 : row + 26, column - 26 : column + 26]
+            image[around] = frame.image[around]
+        yield Frame(frame.time_s, image)
+
+
+def test_stretches_without_a_background_are_told():
+    said = []
+    track = robot(film_with_a_wall(40, 50), warn=said.append)
+    assert not track.valid[41:50].any()
+    assert track.valid[:40].all()
+    assert "not known in 12.2% of the frames (1.3 to 1.7 s): nothing is used of them" in said[-1]
+
+
+def test_a_background_that_seldom_shows_is_told():
+    said = []
+    assert robot(film_with_a_wall(30, 75), warn=said.append).valid[35:70].all()
+    assert len(said) == 1
+    assert "the camera moved, and how is known in only" in said[0]
+
+
+def test_a_path_names_its_unknown_stretches():
+    homographies = np.tile(np.eye(3), (8, 1, 1))
+    homographies[[0, 1, 4, 7]] = np.nan
+    path = CameraPath(homographies, 0.1, "a test")
+    assert path.unknown_s(np.arange(8.0)) == ((0.0, 1.0), (4.0, 4.0), (7.0, 7.0))
+    assert CameraPath(np.tile(np.eye(3), (4, 1, 1)), 0.1, "a test").unknown_s(np.arange(4.0)) == ()
+
+
 def test_short_gaps_are_bridged_and_long_ones_are_not():
     known = np.tile(np.eye(3), (10, 1, 1))
     known[[3, 6, 7, 8]] = np.nan

@@ -3,7 +3,9 @@ import numpy as np
 import pytest
 
 from hil.cli import QualityName
+from hil.sensors.encoding import constant_quality
 from hil.sensors.film_qualities import FILM_QUALITIES, write_quality
+from hil.sensors.video import encode_video
 from mtm_audit.model.picture import Frame
 from mtm_audit.readers.video import read_frames
 
@@ -47,3 +49,12 @@ def test_a_messenger_leaves_less_than_the_phone_wrote(tmp_path):
         write_quality(frames(60), tmp_path / f"{name}.mp4", RATE_HZ, FILM_QUALITIES[name])
         sizes[name] = (tmp_path / f"{name}.mp4").stat().st_size
     assert sizes["messenger"] < 0.4 * sizes["phone"]
+
+
+@pytest.mark.parametrize("encoding", [constant_quality(23), FILM_QUALITIES["phone"].encoding], ids=["archive", "phone"])
+def test_a_film_is_the_same_on_machines_of_any_size(tmp_path, encoding):
+    path = tmp_path / "film.mp4"
+    encode_video(frames(8), path, RATE_HZ, encoding)
+    content = path.read_bytes()
+    # The encoder writes into the film how it was set up.
+    assert b"threads=1 " in content or b"frame-threads=1 " in content
