@@ -23,10 +23,11 @@ LIBRARIES = {
     "serial": ["serial"],
     "mavlink": ["pymavlink"],
     "logs": ["ezc3d", "mcap", "mcap_protobuf", "pymavlink", "pyulog", "rosbags"],
+    "live": ["aiohttp"],
     "parquet": ["pyarrow"],
     "worlds": ["vmas", "mujoco", "Box2D"],
 }
-COMPLETE = ("audit", "logs", "parquet", "hil", "worlds")
+COMPLETE = ("audit", "live", "logs", "parquet", "hil", "worlds")
 
 pytestmark = pytest.mark.long
 
