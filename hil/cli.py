@@ -1,4 +1,4 @@
-"""The command line: `mtm-hil <command>`. Exit codes: 0 done, 1 error, 2 usage, 130 interrupted."""
+"""The command line: `mtm-hil <command>`. Exit codes: docs/command-line.md."""
 
 from collections.abc import Sequence
 from enum import StrEnum
@@ -6,25 +6,30 @@ from typing import Annotated
 
 import typer
 
+from hil.commands.clusters import takes_scheduler
 from hil.commands.codecs_cli import codecs
 from hil.commands.experiments_cli import EXPERIMENTS
 from hil.commands.options import (
     KeyFile,
+    MessageBytes,
     MessageNumber,
+    MessageText,
     NewFolder,
     NoMessage,
     Renderer,
     RendererName,
     WorldSeed,
+    content_of,
     reported_console,
     require_message_or_none,
 )
 from hil.commands.paper_cli import paper
 from hil.commands.verdicts_cli import verdicts
+from mtm_audit.commands.manner import HELP_OPTIONS, version_option
 
 app = typer.Typer(
     help="Robots that send messages through motion, simulated with the real onboard software in the loop.",
-    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False,
+    no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, context_settings=HELP_OPTIONS,
 )  # fmt: skip
 
 
@@ -63,7 +68,9 @@ class QualityName(StrEnum):
 
 
 @app.callback()
-def _every_command() -> None:
+def _every_command(
+    version: Annotated[bool, version_option("mtm-hil")] = False,
+) -> None:
     pass
 
 
@@ -72,8 +79,23 @@ def record(
     *,
     out: NewFolder,
     message: MessageNumber = None,
+    text: MessageText = None,
+    hexadecimal: MessageBytes = None,
     no_message: NoMessage = False,
-    seconds: Annotated[float, typer.Option(help="Length of the recording.")] = 26.0,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS", min=0.1, max=86_400.0, help="Length of the recording (default: 26, or one message)."
+        ),
+    ] = None,
+    robots: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=1,
+            help="How many robots; those beyond the key's bodies send nothing (default: these, or 4).",
+        ),
+    ] = None,
     key: KeyFile = None,
     wire: Annotated[WireName, typer.Option(help="CAN, plaintext or MAVLink protocol, or no wire.")] = WireName.CAN,
     seed: WorldSeed = 0,
@@ -85,10 +107,17 @@ def record(
         QualityName | None, typer.Option(help="Encode the film as these do; nearly lossless without.")
     ] = None,
     shake_px: Annotated[
-        float, typer.Option(min=0.0, max=100.0, help="How far a hand shakes the camera, rms in pixels below 3 Hz.")
+        float,
+        typer.Option(
+            metavar="PIXELS", min=0.0, max=100.0, help="How far a hand shakes the camera, rms in pixels below 3 Hz."
+        ),
     ] = 0.0,
-    pan_deg: Annotated[float, typer.Option(min=-60.0, max=60.0, help="How far the camera pans while it films.")] = 0.0,
-    roll_deg: Annotated[float, typer.Option(min=0.0, max=45.0, help="How far the camera rolls to and fro.")] = 0.0,
+    pan_deg: Annotated[
+        float, typer.Option(metavar="DEGREES", min=-60.0, max=60.0, help="How far the camera pans while it films.")
+    ] = 0.0,
+    roll_deg: Annotated[
+        float, typer.Option(metavar="DEGREES", min=0.0, max=45.0, help="How far the camera rolls to and fro.")
+    ] = 0.0,
     floor: Annotated[
         FloorName, typer.Option(help="A faint mat, a carpet, or a mat with markers on it.")
     ] = FloorName.MAT,
@@ -97,9 +126,9 @@ def record(
         bool, typer.Option("--realtime", help="Run the onboard programs in processes of their own, on real ports.")
     ] = False,
 ) -> None:
-    """Record four simulated robots: motion capture, video, and what was sent."""
-    require_message_or_none(message, no_message)
+    """Record simulated robots that play any key: motion capture, video, and what was sent."""
     with reported_console() as console:
+        content = content_of(message, text, hexadecimal, no_message)
         from math import radians
 
         from hil.commands.record import RecordOptions
@@ -113,7 +142,7 @@ def record(
             RecordOptions(
                 out=out,
                 seconds=seconds,
-                message=message,
+                content=content,
                 key=key,
                 wire=wire.value,
                 seed=seed,
@@ -123,6 +152,7 @@ def record(
                 motion=motion if moves else None,
                 floor=floor.value,
                 plant=plant,
+                robots=robots,
             ),
             console,
         )
@@ -135,7 +165,7 @@ def film(
     out: NewFolder,
     message: MessageNumber = None,
     no_message: NoMessage = False,
-    seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="Length of the film.")] = 30.0,
+    seconds: Annotated[float, typer.Option(metavar="SECONDS", min=1.0, max=3600.0, help="Length of the film.")] = 30.0,
     key: KeyFile = None,
     seed: WorldSeed = 0,
     renderer: RendererName = Renderer.SOFTWARE,
@@ -169,6 +199,10 @@ for _experiment in EXPERIMENTS:
 app.add_typer(paper, name="paper")
 app.add_typer(verdicts, name="verdicts")
 app.add_typer(codecs, name="codecs")
+for _app in (app, paper, verdicts, codecs):
+    for _command in _app.registered_commands:
+        if _command.callback is not None:
+            _command.callback = takes_scheduler(_command.callback)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

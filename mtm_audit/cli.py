@@ -1,30 +1,32 @@
-"""The command line: `mtm-audit <command>`.
-
-Exit codes of `decode`: 0 decoded, 3 absent, 4 inconclusive, 1 error, 2 usage, 130 interrupted.
-"""
+"""The command line: `mtm-audit <command>`. Exit codes: docs/command-line.md."""
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mtm_audit.commands.errors import reported
+from mtm_audit.commands.force import Force
+from mtm_audit.commands.manner import HELP_OPTIONS, version_option
+from mtm_audit.commands.shared_options import takes_options_of
 
 if TYPE_CHECKING:
     from mtm_audit.readers.logs.options import ReadOptions
 
 app = typer.Typer(
     help="Find out what a robot said with its motion: from a recording and a key to a verdict.",
-    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+    no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None, context_settings=HELP_OPTIONS,
 )  # fmt: skip
 
+_TRACKER = "aruco"
 _TRACKER_HELP = (
-    "How to find robots in a video: aruco or aruco:6x6_250, colour:NAME,..., brightness:X0,Y0,X1,Y1, "
-    "arms:INNER,OUTER, football or flow:X0,Y0,X1,Y1 (pixels from the upper left corner)."
+    "How to find robots in a video: aruco (default) or aruco:6x6_250, colour:NAME,..., centroid:COLOUR, brightness or "
+    "brightness:X0,Y0,X1,Y1, arms:INNER,OUTER, football, or flow:X0,Y0,X1,Y1 (pixels from the upper left corner); "
+    "see docs/filming.md."
 )
 
 
@@ -53,25 +55,16 @@ class StrategyName(StrEnum):
     SPLIT = "split"
 
 
-def _version(asked: bool) -> None:
-    if asked:
-        from importlib.metadata import version
-
-        print(f"mtm-audit {version('messages-through-motion')}")
-        raise typer.Exit
-
-
 @app.callback()
 def _every_command(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
+    version: Annotated[bool, version_option("mtm-audit")] = False,
 ) -> None:
     pass
 
 
 @app.command()
 def decode(
+    context: typer.Context,
     paths: Annotated[
         list[Path],
         typer.Argument(metavar="PATH", help="Videos, logs, motion-capture files, or a folder of those or of pictures."),
@@ -88,7 +81,7 @@ def decode(
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
-    tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
+    tracker: Annotated[str | None, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = None,
     reference: Annotated[
         str,
         typer.Option(
@@ -115,23 +108,47 @@ def decode(
     decoys: Annotated[
         int | None,
         typer.Option(
-            min=8, max=10_000, help="Keys that nobody holds, to compare with: 40 for coherency, none for matched."
+            metavar="N",
+            min=8,
+            max=10_000,
+            help="Keys that nobody holds, to compare with: 40 for coherency, none for matched.",
         ),
     ] = None,
     threshold: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="How often a message that is called decoded may be wrong.")
+        float,
+        typer.Option(metavar="P", min=1e-12, max=1.0, help="How often a message that is called decoded may be wrong."),
     ] = 1e-4,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON (docs/decode-json.md) instead of a table.")
     ] = False,
     plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw the decode (.png, .pdf, .svg).")] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE.html", help="Write a page to hand on (docs/report.md).")
+    ] = None,
+    force: Force = False,
+    overlay: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.mp4", help="Draw what was seen and read over the film; FILE.png for one still of it."
+        ),
+    ] = None,
+    sheet: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw twelve pictures of the film with what was seen.")
+    ] = None,
+    together: Annotated[
+        bool,
+        typer.Option("--together", help="All recordings show one message (docs/decoding.md)."),
+    ] = False,
     explain: Annotated[bool, typer.Option("--explain", help="Say stage by stage what was found.")] = False,
     profile: Annotated[
         Path | None, typer.Option(metavar="FILE", help="What mtm-audit profile learnt about this type of robot.")
     ] = None,
     at: Annotated[
         str | None,
-        typer.Option(metavar="TIME", help="When the recording began (2026-01-31T12:00:00Z), for a rolling schedule."),
+        typer.Option(
+            metavar="TIME",
+            help="When the recording began (2026-01-31T12:00:00Z), for a rolling schedule.",
+        ),
     ] = None,
     at_error: Annotated[
         float,
@@ -160,28 +177,84 @@ def decode(
         raise typer.BadParameter("is given; leave it or --search-speed out", param_hint="--speed")
     if (key is None) == (anchor is None and disclosed is None) or (anchor is None) != (disclosed is None):
         raise typer.BadParameter("give a key file, or else an anchor and a disclosed key", param_hint="--key")
-    onset_s, pairs, at_unix_s = _onset_s(onset), _pairs(assign or []), _unix_s(at)
+    onset_s, pairs, times = _onset_s(onset), _pairs(assign or []), [] if at is None else at.split(",")
+    began_unix_s = [_unix_s(text.strip()) for text in times]
+    if len(began_unix_s) > 1 and not together:
+        raise typer.BadParameter("is one time unless recordings are read --together", param_hint="--at")
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.decode import DecodeOptions, run_decode
         from mtm_audit.commands.opened_key import KeySource
         from mtm_audit.decoding.settings import DecodeSettings
         from mtm_audit.detectors.matched.profile import load_profile
         from mtm_audit.model.recorded_at import RecordedAt
+        from mtm_audit.reporting.overlay.files import overlay_files
+        from mtm_audit.reporting.report.provenance import requested
         from mtm_onboard.protocol.revocation import RevocationList, load_revocations
 
         known = None if profile is None else load_profile(profile)
-        recorded = None if at_unix_s is None else RecordedAt(at_unix_s, at_error)
+        began = [RecordedAt(unix_s, at_error) for unix_s in began_unix_s if unix_s is not None]
         settings = DecodeSettings(
             detector=detector, onset_s=onset_s, decoys=decoys, threshold=threshold, assignment=pairs, profile=known,
-            at=recorded, revoked=RevocationList() if revoked is None else load_revocations(revoked),
+            at=began[0] if began else None,
+            revoked=RevocationList() if revoked is None else load_revocations(revoked),
         )  # fmt: skip
         reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        given = _given({
+            "--tracker": tracker, "--reference": reference, "--frame-rate": frame_rate, "--topic": topic,
+            "--body": body, "--unit": unit, "--time-unit": time_unit, "--up": up, "--arrival-times": arrival_times,
+            "--at": at,
+        })  # fmt: skip
         played = None if search_speed else 1.0 if speed is None else speed
+        inputs = {
+            "key": key, "anchor": anchor, "disclosed key": disclosed, "profile": profile, "revocations": revoked,
+        }  # fmt: skip
         code = run_decode(
             DecodeOptions(
-                paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker,
+                paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker or _TRACKER,
                 reference=_names(reference), settings=settings, as_json=as_json, plot=plot, explain=explain,
-                reading=reading, frame_rate_hz=frame_rate, speed=played,
+                reading=reading, frame_rate_hz=frame_rate, speed=played, overlay=overlay_files(overlay, sheet),
+                report=None if report is None else requested(report, context.find_root().obj, inputs), force=force,
+                together=together, each_at=tuple(began) if together else (), given=given,
+            )
+        )  # fmt: skip
+    raise typer.Exit(code)
+
+
+@app.command()
+def look(
+    paths: Annotated[
+        list[Path],
+        typer.Argument(metavar="PATH", help="Videos, logs, motion-capture files, or a folder of those or of pictures."),
+    ],
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.png", help="Draw a picture of the film with pixel numbers and what was found."),
+    ] = None,
+    force: Force = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON (docs/look.md) instead of text.")] = False,
+    frame_rate: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Pictures a second that the camera took, whatever the file says."),
+    ] = None,
+    topic: _Topics = None,
+    body: _Bodies = None,
+    unit: _Unit = None,
+    time_unit: _TimeUnit = None,
+    up: _Up = None,
+    arrival_times: _ArrivalTimes = False,
+) -> None:
+    """Say what is in a recording, without a key: markers, colours, motion, times, and how to decode it.
+
+    Exit codes: 0 looked at, 1 error, 2 usage, 130 interrupted.
+    """  # fmt: skip
+    with reported("mtm-audit", "nothing was written"):
+        from mtm_audit.commands.look import LookOptions, run_look
+
+        reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        code = run_look(
+            LookOptions(
+                paths=tuple(paths), picture=picture, as_json=as_json, frame_rate_hz=frame_rate, reading=reading,
+                force=force,
             )
         )  # fmt: skip
     raise typer.Exit(code)
@@ -266,6 +339,93 @@ def watch(
     raise typer.Exit(code)
 
 
+@app.command()
+@takes_options_of(
+    decode,
+    "onset",
+    "tracker",
+    "reference",
+    "assign",
+    "frame_rate",
+    "speed",
+    "search_speed",
+    "detector",
+    "decoys",
+    "threshold",
+    "profile",
+    "at",
+    "at_error",
+    "topic",
+    "body",
+    "unit",
+    "time_unit",
+    "up",
+    "arrival_times",
+    "revoked",
+)
+def batch(
+    paths: Annotated[
+        list[Path], typer.Argument(metavar="PATH", help="Recordings, and folders that hold any (docs/batch.md).")
+    ],
+    *,
+    key: Annotated[list[Path], typer.Option(metavar="FILE", help="A key file; may be repeated, which is paid for.")],
+    out: Annotated[Path, typer.Option(metavar="FILE.csv", help="The table to write, a row for each recording.")],
+    jobs: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Recordings read at once (default: one a core).")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="A Dask cluster to work on, such as tcp://192.168.0.2:8786."),
+    ] = None,
+    cache: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Where tracks are kept for the next key (default: ~/.cache/mtm/tracks)."),
+    ] = None,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Replace any table or other file, whatever it holds; a key file never is."),
+    ] = False,
+    **shared: Any,
+) -> None:
+    """Decode many recordings into one table; a run that was stopped goes on when it is started again.
+
+    Exit codes: 0 all were read, whatever they say, 1 error, or some could not be read, 2 usage, 130 interrupted.
+    """  # fmt: skip
+    if scheduler is not None and jobs is not None:
+        raise typer.BadParameter("the cluster's workers decide that; leave it or --scheduler out", param_hint="--jobs")
+    if shared["search_speed"] and shared["speed"] is not None:
+        raise typer.BadParameter("is given; leave it or --search-speed out", param_hint="--speed")
+    onset_s, pairs, at_unix_s = _onset_s(shared["onset"]), _pairs(shared["assign"] or []), _unix_s(shared["at"])
+    with reported("mtm-audit", f"what is finished is in {out}, and the same command goes on from there"):
+        from mtm_audit.batch.plan import Plan, named_keys
+        from mtm_audit.commands.batch import BatchOptions, run_batch_command
+        from mtm_audit.decoding.settings import DecodeSettings
+        from mtm_audit.detectors.matched.profile import load_profile
+        from mtm_audit.model.recorded_at import RecordedAt
+        from mtm_onboard.protocol.revocation import RevocationList, load_revocations
+
+        revoked = RevocationList() if shared["revoked"] is None else load_revocations(shared["revoked"])
+        settings = DecodeSettings(
+            detector=shared["detector"], onset_s=onset_s, decoys=shared["decoys"], threshold=shared["threshold"],
+            assignment=pairs, profile=None if shared["profile"] is None else load_profile(shared["profile"]),
+            at=None if at_unix_s is None else RecordedAt(at_unix_s, shared["at_error"]), revoked=revoked,
+        )  # fmt: skip
+        reading = _reading(
+            shared["topic"], shared["body"], shared["unit"], shared["time_unit"], shared["up"],
+            arrival_times=shared["arrival_times"],
+        )  # fmt: skip
+        speed = None if shared["search_speed"] else 1.0 if shared["speed"] is None else shared["speed"]
+        plan = Plan(
+            keys=named_keys(key, revoked), settings=settings, tracker=shared["tracker"],
+            reference=_names(shared["reference"]), reading=reading, frame_rate_hz=shared["frame_rate"], speed=speed,
+            cache=None if cache is None else cache.absolute(),
+        )  # fmt: skip
+        code = run_batch_command(
+            BatchOptions(paths=tuple(paths), plan=plan, out=out, jobs=jobs, scheduler=scheduler, force=force)
+        )
+    raise typer.Exit(code)
+
+
 @app.command("profile")
 def learn_profile(
     paths: Annotated[
@@ -273,10 +433,11 @@ def learn_profile(
     ],
     key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
     out: Annotated[Path, typer.Option(metavar="FILE.profile", help="Where to write what was learnt.")],
+    force: Force = False,
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
     ] = "auto",
-    tracker: Annotated[str, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = "aruco",
+    tracker: Annotated[str | None, typer.Option(metavar="NAME", help=_TRACKER_HELP)] = None,
     reference: Annotated[
         str,
         typer.Option(
@@ -304,7 +465,15 @@ def learn_profile(
 
         settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
         reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
-        run_profile(ProfileOptions(tuple(paths), key, out, tracker, _names(reference), settings, reading))
+        given = _given({
+            "--tracker": tracker, "--reference": reference, "--topic": topic, "--body": body, "--unit": unit,
+            "--time-unit": time_unit, "--up": up, "--arrival-times": arrival_times,
+        })  # fmt: skip
+        run_profile(
+            ProfileOptions(
+                tuple(paths), key, out, tracker or _TRACKER, _names(reference), settings, reading, force, given
+            )
+        )
 
 
 @app.command("journal")
@@ -317,12 +486,13 @@ def show_journal(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="Draw commands and lateness (.png, .pdf, .svg).")
     ] = None,
+    force: Force = False,
 ) -> None:
     """Say what a robot's journal tells: message and start, ticks, lateness, limits, noise and events."""
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.journal import run_journal
 
-        run_journal(path, as_json=as_json, plot=plot, key=key)
+        run_journal(path, as_json=as_json, plot=plot, key=key, force=force)
 
 
 @app.command()
@@ -342,6 +512,9 @@ def plan(
     measured_only: Annotated[
         bool, typer.Option("--measured-only", help="Search measured points alone, as the paper does.")
     ] = False,
+    sure: Annotated[
+        bool, typer.Option("--sure", help="Plan so that the interval's lower end meets the target.")
+    ] = False,
     check: Annotated[
         Path | None, typer.Option(metavar="TABLE.csv", help="Compare with accuracies of other recordings.")
     ] = None,
@@ -350,6 +523,7 @@ def plan(
         Path | None, typer.Option(metavar="FILE.toml", help="Scheme file for mtm-onboard keygen --scheme.")
     ] = None,
     plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw accuracy over T.")] = None,
+    force: Force = False,
 ) -> None:
     """Find the fastest scheme for a payload and a target accuracy, from measured accuracies (docs/planning.md).
 
@@ -363,9 +537,9 @@ def plan(
         from mtm_audit.commands.plan import PlanOptions, run_plan
         from mtm_audit.planning.plan import Problem
 
-        problem = Problem(bits, accuracy, tuple(alphabet) if alphabet else None, measured_only)
+        problem = Problem(bits, accuracy, tuple(alphabet) if alphabet else None, measured_only, sure)
         chosen = None if strategy is None else strategy.value
-        code = run_plan(PlanOptions(table, problem, rate, like, chosen, check, plot, out))
+        code = run_plan(PlanOptions(table, problem, rate, like, chosen, check, plot, out, force))
     raise typer.Exit(code)
 
 
@@ -418,6 +592,11 @@ def _unix_s(text: str | None) -> float | None:
     return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()
 
 
+def _given(options: Mapping[str, object]) -> frozenset[str]:
+    """The names of those that were given, which are not None, empty or False."""
+    return frozenset(name for name, value in options.items() if value)
+
+
 def _names(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
@@ -444,15 +623,17 @@ def _reading(
     arrival_times: bool,
 ) -> "ReadOptions":
     from mtm_audit.readers.logs.options import ReadOptions, marker_groups
+    from mtm_onboard.protocol.errors import command_line_values
 
-    return ReadOptions(
-        unit=unit, time_unit=time_unit, up=up, topics=tuple(topics or ()), bodies=marker_groups(bodies or ()),
-        arrival_times=arrival_times,
-    )  # fmt: skip
+    with command_line_values():
+        return ReadOptions(
+            unit=unit, time_unit=time_unit, up=up, topics=tuple(topics or ()), bodies=marker_groups(bodies or ()),
+            arrival_times=arrival_times,
+        )  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command; leaves through SystemExit with the exit code."""
     # Many small products: threads cost twenty times what they save when the machine is busy. Must come before numpy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    app(args=arguments, prog_name="mtm-audit")
+    app(args=arguments, prog_name="mtm-audit", obj=arguments)

@@ -1,4 +1,4 @@
-"""The command line: `mtm-onboard <command>`. Exit codes: 0 done, 1 error, 2 usage, 130 interrupted."""
+"""The command line: `mtm-onboard <command>`. Exit codes: docs/command-line.md."""
 
 import argparse
 import contextlib
@@ -6,6 +6,9 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+
+from mtm_onboard.commands.completion import SHELLS, completion_script
+from mtm_onboard.commands.parser import Parser
 
 # Each module has `add_parser(subparsers)`, which sets `handler(args) -> int`, and imports what it needs only in there.
 _COMMANDS = (
@@ -34,12 +37,48 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
 
 
-def _run(arguments: Sequence[str] | None) -> int:
-    parser = argparse.ArgumentParser(prog="mtm-onboard", description=import_module("mtm_onboard").__doc__)
-    subparsers = parser.add_subparsers(required=True, metavar="command")
+def parser_of() -> Parser:
+    """The command line of all commands."""
+    parser = Parser(prog="mtm-onboard", description=import_module("mtm_onboard").__doc__)
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    parser.add_argument(
+        "--show-completion",
+        action=_Completion,
+        metavar="SHELL",
+        choices=SHELLS,
+        help="print what completes commands in a shell",
+    )
+    subparsers = parser.add_subparsers(metavar="COMMAND", title="Commands", parser_class=Parser)
     for command in _COMMANDS:
         import_module(command).add_parser(subparsers)
+    for own in subparsers.choices.values():
+        own.set_defaults(parser=own)
+    return parser
+
+
+class _Version(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            print(f"mtm-onboard {version('messages-through-motion')}")
+        except PackageNotFoundError:
+            print("mtm-onboard (not installed, so without a version)")
+        parser.exit()
+
+
+class _Completion(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        print(completion_script(parser), end="")
+        parser.exit()
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    parser = parser_of()
     args = parser.parse_args(arguments)
+    if "handler" not in args:
+        print(parser.format_help(), end="", file=sys.stderr)
+        return 2
 
     from mtm_onboard.protocol.errors import MtmError
 
@@ -49,7 +88,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         sys.stdout.flush()
     except MtmError as error:
         print(f"mtm-onboard: {error}", file=sys.stderr)
-        return 1
+        return error.exit_code
     except BrokenPipeError:
         print("mtm-onboard: nobody reads the output any more, so its end is lost; let it be read", file=sys.stderr)
         _discard_output()

@@ -23,8 +23,8 @@ LEVELS = {
         "doctor", "commands", "cli", "__main__",
     ),
     "mtm_audit": (
-        "model", "readers", "tracking", "drawing", "ingest", "detectors", "significance", "decoding", "reporting",
-        "planning", "live", "commands", "cli", "__main__",
+        "model", "readers", "tracking", "drawing", "ingest", "detectors", "survey", "significance", "decoding",
+        "reporting", "planning", "batch", "live", "commands", "cli", "__main__",
     ),
     "hil": (
         "plants", "wires", "vehicles", "sensors", "worlds", "fleet", "experiments.runs", "experiments.detectors",

@@ -8,19 +8,20 @@ from rich.table import Table
 from hil.experiments.detectors.calibrate import SLIPS_MPS, Candidate, best_candidate, scan, write_plant
 from hil.experiments.detectors.paper_figures import MARGINS
 from hil.experiments.runs.cells import CellStore
-from hil.plants.mecanum import PLANT_FILE, calibrated_parameters
+from hil.plants.mecanum import calibrated_parameters
 
 
 def calibrate(rollouts: int, out: Path | None, cells: Path, console: Console) -> None:
-    """Scan the slip, print what each gave, and write the plant's file (that of the package when `out` is None)."""
+    """Scan the slip, print what each gave and, where asked, write the plant's file."""
     plant = calibrated_parameters()
     with CellStore(cells) as store:
         candidates = scan(plant, SLIPS_MPS, rollouts, store, console)
     best = best_candidate(candidates)
     console.print(_table(candidates, best))
-    path = PLANT_FILE if out is None else out
-    write_plant(path, plant, best, f"mtm-hil calibrate -n {rollouts}")
-    print(f"wrote {path}: slip_mps = {best.slip_mps:g}")
+    print(f"slip_mps = {best.slip_mps:g} fits best")
+    if out is not None:
+        write_plant(out, plant, best, f"mtm-hil calibrate -n {rollouts}")
+        print(f"wrote {out}")
 
 
 def _table(candidates: list[Candidate], best: Candidate) -> Table:

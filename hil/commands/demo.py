@@ -13,12 +13,13 @@ from rich.console import Console
 from rich.table import Table
 
 from hil.commands.new_folder import new_folder
-from hil.fleet.programs import SINGLE_THREADED, program
+from hil.fleet.programs import program
+from mtm_audit.batch.processes import SINGLE_THREADED
 from mtm_onboard.protocol import MtmError
 
 MESSAGE = 0b10110010
 SECONDS = 15
-PLOT = "decode.png"
+PLOT, REPORT, STILL = "decode.png", "report.html", "overlay.png"
 _AT_ONCE = 2
 _VERDICT_CODES = (0, 3, 4)
 
@@ -38,7 +39,7 @@ _RECORDINGS = (
     f"mtm-hil record --out silent --no-message --no-video --key robot.key --seconds {SECONDS} --seed 1",
 )
 _CHECKS = (
-    _Check("video", f"message/video.mp4 --key robot.key --plot {PLOT}", MESSAGE),
+    _Check("video", f"message/video.mp4 --key robot.key --plot {PLOT} --report {REPORT} --overlay {STILL}", MESSAGE),
     _Check("motion capture", "message/mocap --key robot.key", MESSAGE),
     _Check("another key", "message/mocap --key other.key", None),
     _Check("no message sent", "silent/mocap --key robot.key", None),
@@ -60,7 +61,8 @@ def demo(out: Path, console: Console) -> bool:
         answers = _decode_all(folder)
     good = [_is_expected(check, answer) for check, answer in zip(_CHECKS, answers, strict=True)]
     console.print(_table(answers, good))
-    print(f"the decode of the video is drawn in {out / PLOT}")
+    print(f"the decode of the video is drawn in {out / PLOT}, and told in {out / REPORT}, for a browser")
+    print(f"what was seen in the video is drawn over a picture of it in {out / STILL}")
     return all(good)
 
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from hil.commands.options import CELLS_FOLDER, Cells, CellSeed, FirstSeed, OutCsv, Workers, reported_console
+from mtm_audit.commands.force import Force
 
 
 class FrameName(StrEnum):
@@ -18,12 +19,15 @@ class FrameName(StrEnum):
 
 
 def calibrate(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each slip and window length.")] = 20,
-    out: Annotated[Path | None, typer.Option(help="The plant's file; that of the package by default.")] = None,
+    rollouts: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Rollouts for each slip and window length.")
+    ] = 20,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="A plant's file to write as well.")] = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "calibrate.jsonl",
 ) -> None:
     """Fit the simulated chassis' wheel slip to the paper's margins."""
-    with reported_console() as console:
+    with reported_console("mtm-hil calibrate", out, force=force) as console:
         from hil.commands.calibrate import calibrate as run
 
         run(rollouts, out, cells, console)
@@ -31,7 +35,9 @@ def calibrate(
 
 def bench(
     *,
-    rollouts: Annotated[int, typer.Option(min=1, help="Rollouts of the main conditions; slow ones take fewer.")] = 200,
+    rollouts: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Rollouts of the main conditions; slow ones take fewer.")
+    ] = 200,
     quick: Annotated[
         bool, typer.Option("--quick", help="A few rollouts of some conditions, for a first look.")
     ] = False,
@@ -39,15 +45,18 @@ def bench(
         str | None,
         typer.Option(metavar="NAMES", help="Other robots instead: all, or names and plant files parted by commas."),
     ] = None,
-    ticks: Annotated[int, typer.Option(min=10, help="With --plants: window of a symbol.")] = 100,
+    ticks: Annotated[int, typer.Option(metavar="TICKS", min=10, help="With --plants: window of a symbol.")] = 100,
     out: OutCsv = None,
-    plot: Annotated[Path | None, typer.Option(help="A picture to draw: accuracy over the window length.")] = None,
+    force: Force = False,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="A picture to draw: accuracy over the window length.")
+    ] = None,
     cells: Cells = CELLS_FOLDER / "bench.jsonl",
 ) -> None:
     """Compare the paper's detector and ours with the genie, an oracle, on the same recordings."""
     if plants is not None and (quick or plot is not None):
         raise typer.BadParameter("--quick and --plot do not go with --plants; take fewer --rollouts for a first look")
-    with reported_console() as console:
+    with reported_console("mtm-hil bench", out, plot, force=force) as console:
         if plants is not None:
             from hil.commands.bench_plants import PlantsOptions, bench_plants
             from hil.experiments.plants.rollout import PlantJob
@@ -63,83 +72,96 @@ def bench(
 
 
 def false_alarms(
-    decodes: Annotated[int, typer.Option("-n", min=4, help="Decodes with a wrong key, and as many without.")] = 3000,
-    detector: Annotated[str, typer.Option(help="Which detector decodes.")] = "matched",
+    *,
+    decodes: Annotated[
+        int, typer.Option("-n", metavar="N", min=4, help="Decodes with a wrong key, and as many without.")
+    ] = 3000,
+    detector: Annotated[str, typer.Option(metavar="NAME", help="Which detector decodes.")] = "matched",
     seed: FirstSeed = 500_000,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "false-alarms.jsonl",
 ) -> None:
     """Decode recordings without a message under the given key, and compare the p-values with a uniform law."""
-    with reported_console() as console:
+    with reported_console("mtm-hil false-alarms", out, force=force) as console:
         from hil.commands.false_alarms import false_alarms as run
 
         run(decodes, detector, seed, workers, out=out, cells=cells, console=console)
 
 
 def messages(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Messages of the first kind; fewer of the others.")] = 200,
+    rollouts: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Messages of the first kind; fewer of the others.")
+    ] = 200,
     seed: FirstSeed = 700_000,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "messages.jsonl",
 ) -> None:
     """Count how many framed messages are received: whole, with a known time, and through occlusions."""
-    with reported_console() as console:
+    with reported_console("mtm-hil messages", out, force=force) as console:
         from hil.commands.messages import messages as run
 
         run(rollouts, seed, workers, out, cells, console)
 
 
 def cameras(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Runs that each camera films.")] = 2,
+    rollouts: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Runs that each camera films.")] = 2,
     seed: CellSeed = 900_000,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "cameras.jsonl",
 ) -> None:
     """Measure the evidence left by a camera that shakes, pans and rolls, and by markers at an angle."""
-    with reported_console() as console:
+    with reported_console("mtm-hil cameras", out, force=force) as console:
         from hil.commands.cameras import cameras as run
 
         run(rollouts, seed, workers, out, cells, console)
 
 
 def frames(
-    count: Annotated[int, typer.Option("-n", min=200, help="Frames under noise for each check.")] = 10_000,
+    count: Annotated[int, typer.Option("-n", metavar="N", min=200, help="Frames under noise for each check.")] = 10_000,
     seed: CellSeed = 0,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "frames.jsonl",
 ) -> None:
     """Decode noisy and attacked frames: how often a wrong payload passes the check, and which decoder reads most."""
-    with reported_console() as console:
+    with reported_console("mtm-hil frames", out, force=force) as console:
         from hil.commands.frames import frames as run
 
         run(count, seed, workers, out, cells, console)
 
 
 def shim(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts, each run with Python and with the shim.")] = 100,
+    rollouts: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Rollouts, each run with Python and with the shim.")
+    ] = 100,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "shim.jsonl",
 ) -> None:
     """Play the message with the microcontroller's C code, in the loop, and compare with Python."""
-    with reported_console() as console:
+    with reported_console("mtm-hil shim", out, force=force) as console:
         from hil.commands.shim import shim as run
 
         run(rollouts, out, cells, console)
 
 
 def robustness(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts under each condition.")] = 100,
+    rollouts: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Rollouts under each condition.")] = 100,
     seed: FirstSeed = 600_000,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "robustness.jsonl",
 ) -> None:
     """Decode the same rollouts under uncalibrated cameras, frame times and clocks."""
-    with reported_console() as console:
+    with reported_console("mtm-hil robustness", out, force=force) as console:
         from hil.commands.robustness import robustness as run
 
         run(rollouts, seed, workers, out, cells, console)
@@ -151,8 +173,9 @@ def sweep(
         typer.Argument(metavar="WORLD", help="The world: robomaster, discovery, lunar-lander, reacher or football."),
     ],
     *,
-    out: Annotated[Path, typer.Option(help="The accuracy table to write, for mtm-audit plan.")],
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each M and window.")] = 50,
+    out: Annotated[Path, typer.Option(metavar="FILE.csv", help="The accuracy table to write, for mtm-audit plan.")],
+    force: Force = False,
+    rollouts: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Rollouts for each M and window.")] = 50,
     alphabet: Annotated[
         list[int] | None, typer.Option(metavar="M", help="Alphabet size; may be repeated (default: 4, 16, 64).")
     ] = None,
@@ -160,17 +183,23 @@ def sweep(
         list[int] | None,
         typer.Option(metavar="TICKS", min=1, help="Window; may be repeated (default: 30, 45, 60, 80, 110, 150)."),
     ] = None,
-    windows: Annotated[int, typer.Option(min=1, help="Windows in a row, about as many as a message will have.")] = 2,
+    windows: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Windows in a row, about as many as a message will have.")
+    ] = 2,
     scheme: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Measure this scheme's own windows, and whole messages.")
     ] = None,
-    detector: Annotated[str, typer.Option(help="Which detector decodes: matched or coherency.")] = "matched",
-    first_seed: FirstSeed = 700_000,
+    detector: Annotated[
+        str, typer.Option(metavar="NAME", help="Which detector decodes: matched or coherency.")
+    ] = "matched",
+    seed: Annotated[
+        int, typer.Option("--seed", "--first-seed", metavar="N", min=0, help="The first rollout's seed.")
+    ] = 700_000,
     workers: Workers = None,
     cells: Cells = CELLS_FOLDER / "sweep.jsonl",
 ) -> None:
     """Measure how often a symbol is right, by channel, alphabet size and window length."""  # fmt: skip
-    with reported_console() as console:
+    with reported_console("mtm-hil sweep", out, force=force) as console:
         from hil.commands.sweep import SweepOptions
         from hil.commands.sweep import sweep as run
 
@@ -182,7 +211,7 @@ def sweep(
             windows=windows,
             scheme=scheme,
             detector=detector,
-            first_seed=first_seed,
+            first_seed=seed,
             workers=workers,
             out=out,
             cells=cells,
@@ -191,28 +220,38 @@ def sweep(
 
 
 def real(
-    folder: Annotated[Path, typer.Argument(help="Recorded trajectories without a message: TUM or CSV files.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Recorded trajectories without a message: TUM or CSV files.")
+    ],
     *,
-    messages: Annotated[int, typer.Option("-n", min=1, help="Messages on each recording, frame and sigma.")] = 2,
+    messages: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Messages on each recording, frame and sigma.")
+    ] = 2,
     frame: Annotated[
         list[FrameName] | None, typer.Option(help="Where the noise lives; may be repeated (default: both).")
     ] = None,
     sigma: Annotated[
-        list[float] | None, typer.Option(min=1e-4, max=10.0, help="Noise in m/s; may be repeated (default: 0.1).")
+        list[float] | None,
+        typer.Option(metavar="MPS", min=1e-4, max=10.0, help="Noise in m/s; may be repeated (default: 0.1)."),
     ] = None,
     alphabet: Annotated[int, typer.Option(metavar="M", min=2, help="Alphabet size.")] = 8,
     window: Annotated[float, typer.Option(metavar="SECONDS", min=0.1, help="Length of a symbol.")] = 4.0,
-    seconds: Annotated[float, typer.Option(min=1.0, help="Length of the piece of each recording.")] = 48.0,
+    seconds: Annotated[
+        float, typer.Option(metavar="SECONDS", min=1.0, help="Length of the piece of each recording.")
+    ] = 48.0,
     band: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Band of the noise in Hz.")] = "0.5:4",
-    threshold: Annotated[float, typer.Option(min=1e-12, max=1.0, help="How often a verdict may be wrong.")] = 1e-4,
+    threshold: Annotated[
+        float, typer.Option(metavar="P", min=1e-12, max=1.0, help="How often a verdict may be wrong.")
+    ] = 1e-4,
     onset_known: Annotated[bool, typer.Option("--onset-known", help="Tell the decode when the message began.")] = False,
     seed: FirstSeed = 800_000,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "real.jsonl",
 ) -> None:
     """Add messages to recorded motion, through plants drawn at random, and decode it."""
-    with reported_console() as console:
+    with reported_console("mtm-hil real", out, force=force) as console:
         from hil.commands.real import RealOptions, band_of
         from hil.commands.real import real as run
 
@@ -244,14 +283,21 @@ def identify(
     offset: Annotated[
         float, typer.Option(metavar="SECONDS", help="Added to the commands' times, such as when a journal begins.")
     ] = 0.0,
-    plant: Annotated[Path | None, typer.Option(help="A plant file to write, for bench --plants and record.")] = None,
-    profile: Annotated[Path | None, typer.Option(help="A profile to write, for mtm-audit decode.")] = None,
-    summary: Annotated[str, typer.Option(help="What kind of robot it is, for the plant file.")] = "identified",
-    source: Annotated[str, typer.Option(help="Where the logs come from, for the plant file.")] = "",
+    plant: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help="A plant file to write, for bench --plants and record.")
+    ] = None,
+    profile: Annotated[
+        Path | None, typer.Option(metavar="FILE.profile", help="A profile to write, for mtm-audit decode.")
+    ] = None,
+    summary: Annotated[
+        str, typer.Option(metavar="TEXT", help="What kind of robot it is, for the plant file.")
+    ] = "identified",
+    source: Annotated[str, typer.Option(metavar="TEXT", help="Where the logs come from, for the plant file.")] = "",
     out: OutCsv = None,
+    force: Force = False,
 ) -> None:
     """Measure how a robot follows its commands, from what was commanded and how it moved."""
-    with reported_console() as console:
+    with reported_console("mtm-hil identify", out, plant, profile, force=force) as console:
         from hil.commands.identify import IdentifyOptions
         from hil.commands.identify import identify as run
 
@@ -268,14 +314,17 @@ def identify(
 
 
 def faults(
-    seeds: Annotated[int, typer.Option("-n", min=1, help="Runs of each combination of wire, fault and loss.")] = 3,
-    seed: Annotated[int, typer.Option(min=0, help="The first run's seed.")] = 0,
+    seeds: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Runs of each combination of wire, fault and loss.")
+    ] = 3,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="The first run's seed.")] = 0,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "faults.jsonl",
 ) -> None:
     """Run a robot under every fault of its wire, alone and with a lost link: stops, stale commands, the message."""
-    with reported_console() as console:
+    with reported_console("mtm-hil faults", out, force=force) as console:
         from hil.commands.faults import faults as run
 
         if not run(seeds, seed, workers, out, cells, console):
@@ -283,14 +332,17 @@ def faults(
 
 
 def fuzz(
-    inputs: Annotated[int, typer.Option("-n", min=1, help="Inputs, over all ends of all wires.")] = 1_000_000,
+    inputs: Annotated[
+        int, typer.Option("-n", metavar="N", min=1, help="Inputs, over all ends of all wires.")
+    ] = 1_000_000,
     seed: CellSeed = 0,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "fuzz.jsonl",
 ) -> None:
     """Feed damaged traffic to both ends of every wire, and count the messages that they accept."""
-    with reported_console() as console:
+    with reported_console("mtm-hil fuzz", out, force=force) as console:
         from hil.commands.fuzz import fuzz as run
 
         if not run(inputs, seed, workers, out, cells, console):
@@ -298,31 +350,69 @@ def fuzz(
 
 
 def forgeries(
-    tries: Annotated[int, typer.Option("-n", min=1, help="Tries, over all attacks.")] = 10_000,
+    tries: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Tries, over all attacks.")] = 10_000,
     seed: CellSeed = 0,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "forgeries.jsonl",
 ) -> None:
     """Forge messages of keys as they are made by default: splices, journals, learnt codebooks, replays, relays.
 
-    Stop it at any time: what is finished is kept, and the next run goes on. About 3 s a try and core.
+    Stop it at any time: what is finished is kept, and the next run goes on. 10,000 take about 40 minutes of a core.
     """
-    with reported_console() as console:
+    with reported_console("mtm-hil forgeries", out, force=force) as console:
         from hil.commands.forgeries import forgeries as run
 
         if not run(tries, seed, workers, out, cells, console):
             raise typer.Exit(1)
 
 
+def attacks(
+    *,
+    rollouts: Annotated[
+        int, typer.Option("-n", min=1, help="Rollouts at each level of the paper's tables; others take a part.")
+    ] = 50,
+    only: Annotated[list[str] | None, typer.Option(metavar="NAME", help="This attack; may be repeated.")] = None,
+    seed: FirstSeed = 40_000,
+    workers: Workers = None,
+    out: Annotated[Path | None, typer.Option(help="A folder to write attacks_NAME.csv in as well.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="A picture to draw: a panel for each attack.")] = None,
+    cells: Cells = CELLS_FOLDER / "attacks.jsonl",
+) -> None:
+    """Suppress, forge and spy on messages: the paper's two tables of attacks, and a curve for each that it leaves open.
+
+    Stop it at any time: what is finished is kept, and the next run goes on.
+    """
+    with reported_console() as console:
+        from hil.commands.attacks import AttackOptions
+        from hil.commands.attacks import attacks as run
+
+        options = AttackOptions(
+            names=tuple(only or ()),
+            rollouts=rollouts,
+            first_seed=seed,
+            workers=workers,
+            out=out,
+            plot=plot,
+            cells=cells,
+        )
+        run(options, console)
+
+
 def endurance(
-    hours: Annotated[float, typer.Option(min=0.0, help="Simulated hours.")] = 24.0,
-    checkpoints: Annotated[int, typer.Option(min=1, help="Number of checkpoints, evenly spaced up to the end.")] = 24,
-    seed: Annotated[int, typer.Option(min=0, help="Decides where the robot goes and how its wheels slip.")] = 0,
+    hours: Annotated[float, typer.Option(metavar="HOURS", min=0.0, help="Simulated hours.")] = 24.0,
+    checkpoints: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Number of checkpoints, evenly spaced up to the end.")
+    ] = 24,
+    seed: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Decides where the robot goes and how its wheels slip.")
+    ] = 0,
     out: OutCsv = None,
+    force: Force = False,
 ) -> None:
     """Run one robot for a day in simulated time: memory, journal, ticks, and the message in each last minute."""
-    with reported_console() as console:
+    with reported_console("mtm-hil endurance", out, force=force) as console:
         from hil.commands.endurance import endurance as run
 
         run(hours, checkpoints, seed, out, console)
@@ -331,5 +421,5 @@ def endurance(
 # In the order in which --help lists them.
 EXPERIMENTS: tuple[Callable[..., None], ...] = (
     calibrate, bench, cameras, false_alarms, messages, frames, shim, robustness, sweep, real, identify, faults, fuzz,
-    forgeries, endurance,
+    forgeries, attacks, endurance,
 )  # fmt: skip

@@ -10,6 +10,7 @@ from hil.experiments.runs.cells import CellStore
 from hil.experiments.runs.intervals import clopper_pearson
 from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
+from mtm_audit.detectors import make_detector
 
 _COLUMNS = ("arm", "detector", "decodes", "decoded", "inconclusive", "ks_p", "level", "below", "low", "high")
 _LEVELS = (0.5, 0.1, 0.05, 0.01, 0.001, 0.0001)
@@ -19,6 +20,7 @@ def false_alarms(
     decodes: int, detector: str, seed: int, workers: int | None, *, out: Path | None, cells: Path, console: Console
 ) -> None:
     """Measure, print and, where asked, write how often p-values fall below each level."""
+    make_detector(detector)
     summaries = []
     with CellStore(cells) as store:
         for arm in (WRONG_KEY, NO_MESSAGE):

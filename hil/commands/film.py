@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from hil.commands.new_folder import new_folder
+from hil.commands.new_folder import check_new, new_folder
 from hil.experiments.worlds.points import SAME, headline_point
 from hil.experiments.worlds.rollout import NATIVE
 from hil.sensors.video import write_video
@@ -49,6 +49,7 @@ def film(options: FilmOptions, console: Console) -> None:
 
     Raises MtmError when the folder exists, the simulator is missing, or the key's scheme is not for this world.
     """
+    check_new(options.out)
     world = make_world(options.world)
     scheme = headline_point(options.world).of_arrangement(SAME).scheme
     key = generate_key(options.world, scheme) if options.key is None else load_key(options.key)

@@ -116,7 +116,7 @@ def _write_profile(axes: Sequence[IdentifiedAxis], path: Path) -> None:
         print(f"no profile: the plants that decode knows miss {100 * worst:.0f} % of a response, and at most "
               f"{100 * MOST_MISSED:.0f} % would do")  # fmt: skip
         return
-    save_profile(profile, path)
+    save_profile(profile, path, "mtm-hil identify")
     print(f"wrote {path}; use it with mtm-audit decode --profile {path}")
 
 

@@ -10,6 +10,12 @@ from pathlib import Path
 from mtm_onboard.protocol import MtmError
 
 
+def check_new(path: Path) -> None:
+    """Raise MtmError when there is something at `path`; meant for the time before the long work."""
+    if path.exists() or path.is_symlink():
+        raise MtmError(f"{path} exists already; choose another folder or remove it first")
+
+
 @contextmanager
 def new_folder(path: Path) -> Iterator[Path]:
     """Yield a temporary folder beside `path` that becomes `path` when the block succeeds.
@@ -17,8 +23,7 @@ def new_folder(path: Path) -> Iterator[Path]:
     An exception or an interrupt inside the block removes it. Folders above `path` are made where they are missing.
     Raises MtmError when `path` exists or cannot be made.
     """
-    if path.exists() or path.is_symlink():
-        raise MtmError(f"{path} exists already; choose another folder or remove it first")
+    check_new(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(prefix=f".{path.name}-", dir=path.parent))

@@ -15,6 +15,7 @@ from hil.experiments.worlds.tables import measure as measure_world
 from hil.plants.mecanum import calibrated_parameters
 from hil.worlds.registry import NAMES, make_world
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.output_file import check_outputs
 
 # Points other than the headline's scheme take a tenth of the rollouts; one rollout of Football tries one of its 64
 # strategies, so that its rollouts come in such numbers.
@@ -36,6 +37,7 @@ class WorldOptions:
     workers: int | None
     out: Path | None
     cells: Path
+    force: bool = False
 
     def effort(self, world: str) -> Effort:
         """How much to measure in a world."""
@@ -66,6 +68,11 @@ def paper_robomaster(rollouts: int, out: Path | None, cells: Path, console: Cons
 
 def paper_table(name: str, options: WorldOptions, console: Console) -> None:
     """The table of that name: a world's, or `null`, `performance` or `all`."""
+    CellStore.check(options.cells)
+    if name == "all":
+        _check_folder(options)
+    else:
+        check_outputs(f"mtm-hil paper {name}", options.out, force=options.force)
     whole = {"null": paper_null, "performance": paper_performance, "all": paper_all}
     if name in whole:
         whole[name](options, console)
@@ -91,8 +98,6 @@ def paper_all(options: WorldOptions, console: Console) -> None:
     """All tables of the simulated worlds, in a folder where asked."""
     _check_simulators()
     folder = options.out
-    if folder is not None and not folder.is_dir():
-        raise MtmError(f"{folder} is no folder; make it, or name another")
     parts = {"null": paper_null, "performance": paper_performance}
     for name in (*NAMES, *parts):
         own = replace(options, out=None if folder is None else folder / f"{name}.csv")
@@ -132,6 +137,16 @@ def _measured(
     world: str, options: WorldOptions, conditions: Sequence[Condition], store: CellStore, console: Console
 ) -> tuple[list[Row], float]:
     return measure_world(world, options.effort(world), conditions, store, console, options.workers)
+
+
+def _check_folder(options: WorldOptions) -> None:
+    folder = options.out
+    if folder is None:
+        return
+    if not folder.is_dir():
+        raise MtmError(f"{folder} is no folder; make it, or name another")
+    for name in (*NAMES, "null", "performance"):
+        check_outputs(f"mtm-hil paper {name}", folder / f"{name}.csv", force=options.force)
 
 
 def _check_simulators() -> None:

@@ -15,19 +15,23 @@ from hil.commands.options import (
     Workers,
     reported_console,
 )
+from mtm_audit.commands.force import Force
 
-paper = typer.Typer(help="The paper's tables, measured on the simulated robots.", no_args_is_help=True)
+paper = typer.Typer(
+    help="The paper's tables, measured on the simulated robots.", no_args_is_help=True, rich_markup_mode=None
+)
 
 
 @paper.command("robomaster")
 def paper_robomaster(
-    rollouts: Annotated[int, typer.Option("-n", min=1, help="Rollouts for each row of the table.")] = 40,
+    rollouts: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Rollouts for each row of the table.")] = 40,
     quick: Annotated[bool, typer.Option("--quick", help="Five rollouts, for a first look.")] = False,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "robomaster.jsonl",
 ) -> None:
     """Accuracy and margin over the window length, with a wrong key and without a message, beside the paper's."""
-    with reported_console() as console:
+    with reported_console("mtm-hil paper robomaster", out, force=force) as console:
         from hil.commands.paper import paper_robomaster as run
 
         run(5 if quick else rollouts, out, cells, console)
@@ -35,7 +39,12 @@ def paper_robomaster(
 
 _Rollouts = Annotated[
     int,
-    typer.Option("-n", min=1, help="Rollouts at the headline's scheme, Football 64 for each ten; others take a part."),
+    typer.Option(
+        "-n",
+        metavar="N",
+        min=1,
+        help="Rollouts at the headline's scheme, Football 64 for each ten; others take a part.",
+    ),
 ]
 _Quick = Annotated[bool, typer.Option("--quick", help="One rollout of a few points, for a first look.")]
 
@@ -48,7 +57,10 @@ def _paper_worlds(
     seed: FirstSeed = 10_000,
     renderer: RendererName = Renderer.SOFTWARE,
     workers: Workers = None,
-    out: Annotated[Path | None, typer.Option(help="A CSV file to write as well; a folder for all.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.csv|FOLDER", help="A CSV file to write as well; a folder for all.")
+    ] = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "worlds.jsonl",
 ) -> None:
     with reported_console() as console:
@@ -63,6 +75,7 @@ def _paper_worlds(
                 renderer=renderer.value,
                 workers=workers,
                 out=out,
+                force=force,
                 cells=cells,
             ),
             console,

@@ -17,6 +17,7 @@ from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.runs.sweep import run_sweep
 from mtm_audit.ingest.recording import recording_files
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.errors import WrongValueError
 
 _COLUMNS = (
     "recording", "frame", "sigma", "seed", "symbol", "start_s", "onset_s", "delay_s", "natural_hz", "damping", "gain",
@@ -47,6 +48,7 @@ class RealOptions:
 
 def real(options: RealOptions, console: Console) -> None:
     """Measure, print and, where asked, write the table; raises MtmError when nothing in the folder can be used."""
+    CellStore.check(options.cells)
     files = _files(options.folder)
     jobs = [_job(options, frame, sigma) for sigma in options.sigmas for frame in options.frames]
     rows: list[tuple[object, ...]] = []
@@ -74,7 +76,7 @@ def band_of(text: str) -> tuple[float, float]:
     try:
         return float(low), float(high)
     except ValueError as error:
-        raise MtmError(f"the band {text!r} is not LOW:HIGH in Hz; give one such as 0.5:4") from error
+        raise WrongValueError(f"the band {text!r} is not LOW:HIGH in Hz; give one such as 0.5:4") from error
 
 
 def _files(folder: Path) -> list[Path]:

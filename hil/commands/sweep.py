@@ -72,5 +72,5 @@ def _command(options: SweepOptions) -> str:
     what += [f"--windows {options.windows}"] if options.scheme is None else [f"--scheme {options.scheme}"]
     return " ".join(
         [f"mtm-hil sweep {options.world} -n {options.rollouts}", *what, f"--detector {options.detector}",
-         f"--first-seed {options.first_seed} --out {options.out}"]
+         f"--seed {options.first_seed} --out {options.out}"]
     )  # fmt: skip

@@ -30,7 +30,7 @@ from hil.experiments.verdicts.validity import (
     validity_cells,
 )
 from hil.experiments.verdicts.watched import SECONDS, summarise_watched, watch_silent, watched_cells
-from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.errors import WrongValueError
 
 Row = tuple[object, ...]
 
@@ -68,7 +68,7 @@ def known_names(asked: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:
     names, choices = tuple(asked), tuple(known)
     for name in names:
         if name not in choices:
-            raise MtmError(f"there is no {name!r} to measure; choose from: {'; '.join(choices)}")
+            raise WrongValueError(f"there is no {name!r} to measure; choose from: {'; '.join(choices)}")
     return names
 
 

@@ -1,7 +1,7 @@
 """A run in simulated time: the onboard runtime of every robot, its wire and its plant, in lockstep."""
 
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ from hil.worlds.robomaster import Route, Task, routes
 from mtm_onboard.links.base import Link
 from mtm_onboard.links.mavlink import MavlinkLink
 from mtm_onboard.links.robomaster_can import RoboMasterCan
-from mtm_onboard.model.velocity import STOP
+from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Channel
 from mtm_onboard.protocol.framing import channel_symbols
 from mtm_onboard.runtime.guard import Guard, Staleness
@@ -48,6 +48,26 @@ class _Link:
     faults: Callable[[], int]
     shutdown: Callable[[], None]
     stop_releases_motors: bool = True
+
+
+class _Adders:
+    """The noise of several channels of one body, one added to the other."""
+
+    def __init__(self, adders: Sequence[NoiseAdder]) -> None:
+        self._adders = adders
+
+    def require_body_axes(self) -> None:
+        for adder in self._adders:
+            adder.require_body_axes()
+
+    def add(self, tick: int, base: BodyVelocity) -> BodyVelocity:
+        for adder in self._adders:
+            base = adder.add(tick, base)
+        return base
+
+    def prepare(self, tick: int) -> None:
+        for adder in self._adders:
+            adder.prepare(tick)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,8 +138,9 @@ def _run(settings: RunSettings, clock: SimulatedClock, robots: list[_Robot]) -> 
         samples = len(poses)
     clock.sleep_until(settings.seconds + _SETTLING_S)
     motion = np.frombuffer(poses[:samples], dtype=np.float64).reshape(-1, len(robots), 3)
-    names = [channel.body for channel in settings.key.scheme.channels]
-    return RunResult(_trajectories(names, motion), settings.onset_s, tuple(robot.report(stats) for robot in robots))
+    return RunResult(
+        _trajectories(settings.names, motion), settings.onset_s, tuple(robot.report(stats) for robot in robots)
+    )
 
 
 def _loop(settings: RunSettings, clock: SimulatedClock, step: Callable[[int, float, float], None]) -> LoopStats:
@@ -141,15 +162,16 @@ def _opened(transports: list[Link], clock: SimulatedClock) -> Iterator[None]:
 
 
 def _robots(settings: RunSettings, clock: SimulatedClock) -> list[_Robot]:
-    seeds, scheme, message = seeds_of(settings.seed), settings.key.scheme, settings.message()
-    each = zip(scheme.channels, seeds.slips, routes(seeds.permutation()), strict=True)
-    return [_robot(settings, clock, channel, message, slip_seed, route) for channel, slip_seed, route in each]
+    names, message = settings.names, settings.message()
+    seeds = seeds_of(settings.seed, len(names))
+    each = zip(names, seeds.slips, routes(seeds.permutation()), strict=True)
+    return [_robot(settings, clock, name, message, slip_seed, route) for name, slip_seed, route in each]
 
 
 def _robot(
     settings: RunSettings,
     clock: SimulatedClock,
-    channel: Channel,
+    name: str,
     message: Message | None,
     slip_seed: int,
     route: Route,
@@ -158,11 +180,14 @@ def _robot(
     controller, link = _wired(settings.wire, plant, clock)
     source = HeldSource()
     period_s = 1.0 / settings.key.scheme.rate_hz
-    guard = Guard(LIMITS, Staleness(), noise_sigma=channel.sigma, period_s=period_s)
-    modulator = None if message is None else _modulator(settings, channel, message)
+    channels = settings.channels(name)
+    sigma = max((channel.sigma for channel in channels), default=0.0)
+    guard = Guard(LIMITS, Staleness(), noise_sigma=sigma, period_s=period_s)
+    adders = [] if message is None else [_modulator(settings, channel, message) for channel in channels]
+    modulator = adders[0] if len(adders) == 1 else _Adders(adders) if adders else None
     runtime = Runtime(modulator, guard, source, link.transport)
     return _Robot(
-        name=channel.body,
+        name=name,
         plant=plant,
         controller=controller,
         link=link,
@@ -232,7 +257,7 @@ def _direct_link(controller: MotionController, clock: SimulatedClock) -> _Link:
     return _Link(DirectLink(controller, clock), controller.advance, lambda: controller.faults, lambda: None)
 
 
-def _trajectories(names: list[str], motion: Floats) -> tuple[Trajectory, ...]:
+def _trajectories(names: Sequence[str], motion: Floats) -> tuple[Trajectory, ...]:
     """From poses (samples, robots, 3)."""
     times_s: Floats = np.arange(len(motion), dtype=np.float64) * SAMPLE_PERIOD_S
     return tuple(

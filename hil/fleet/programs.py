@@ -1,14 +1,10 @@
-"""The project's installed programs, and the environment to run several of them at once."""
+"""The project's installed programs."""
 
 import sysconfig
 from pathlib import Path
 
 from mtm_onboard.protocol import MtmError
 from mtm_onboard.protocol.installing import install_command
-
-# Numerical libraries read these when they are loaded. Several computing processes with more threads than there are
-# cores slow each other down.
-SINGLE_THREADED = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
 def program(name: str) -> str:

@@ -150,11 +150,17 @@ def _content(settings: RunSettings) -> list[str]:
 
 
 def _robots(settings: RunSettings, arguments: list[str], folder: Path, stack: ExitStack) -> list[_Robot]:
-    seeds = seeds_of(settings.seed)
+    names = settings.names
+    seeds = seeds_of(settings.seed, len(names))
     robots = []
-    for channel, slip, route in zip(
-        settings.key.scheme.channels, seeds.slips, routes(seeds.permutation()), strict=True
-    ):
+    for name, slip, route in zip(names, seeds.slips, routes(seeds.permutation()), strict=True):
+        channels = settings.channels(name)
+        if len(channels) != 1:
+            raise MtmError(
+                f"in real time each robot plays one channel, and the key holds {len(channels)} of {name}; leave out "
+                "--realtime"
+            )
+        channel = channels[0]
         plant = settings.new_chassis(slip, route.start_xy_m)
         wire = serial_wire(settings.wire, plant)
         stack.callback(wire.shutdown)

@@ -52,15 +52,17 @@ def write_recording(
     write_tum_files(motion_capture_tracks(result, settings.seed, sensors.motion_capture), mocap)
     if sensors.camera is not None:
         frames = film(sensors.camera, sensors.scene, list(result.trajectories), _generators(settings.seed)[1])
-        _write_film(_counted(frames, filmed), folder / "video.mp4", sensors.camera.rate_hz, sensors.quality)
+        _write_film(_counted(frames, filmed), folder / "video.mp4", sensors, settings.unix_s)
     (folder / "truth.json").write_text(json.dumps(truth(settings, result), indent=2) + "\n", encoding="utf-8")
 
 
-def _write_film(frames: Iterator[Frame], path: Path, rate_hz: float, quality: FilmQuality | None) -> None:
-    if quality is None:
-        write_video(frames, path, rate_hz)
+def _write_film(frames: Iterator[Frame], path: Path, sensors: Sensors, began_unix_s: float | None) -> None:
+    assert sensors.camera is not None
+    rate_hz = sensors.camera.rate_hz
+    if sensors.quality is None:
+        write_video(frames, path, rate_hz, began_unix_s=began_unix_s)
     else:
-        write_quality(frames, path, rate_hz, quality)
+        write_quality(frames, path, rate_hz, sensors.quality, began_unix_s)
 
 
 def truth(settings: RunSettings, result: RunResult) -> dict[str, Any]:

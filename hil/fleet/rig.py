@@ -5,6 +5,7 @@ One integer seed decides everything random about a run except its waveforms, whi
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import count, islice
 from typing import Any, Literal
 
 import numpy as np
@@ -12,8 +13,8 @@ import numpy as np
 from hil.plants.mecanum import MecanumParameters, MecanumPlant, calibrated_parameters
 from hil.sensors.poses import Trajectory
 from hil.vehicles.motion_controller import Plant
-from hil.worlds.robomaster import ROBOTS, TaskFactory, go_to_goal, random_permutation
-from mtm_onboard.protocol import Codebook, Key, MtmError
+from hil.worlds.robomaster import MOST_ROBOTS, ROBOTS, TaskFactory, go_to_goal, random_permutation
+from mtm_onboard.protocol import Channel, Codebook, Key, MtmError
 from mtm_onboard.protocol.framing import Payload
 from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.runtime.guard import Limits
@@ -41,6 +42,7 @@ class RunSettings:
     directions, "direct" gives the same motion without it, and "plaintext" is the EP's text protocol, which rounds
     commands. `modulator` may put something else, such as the C shim, in the place of the Python one, `task` other work
     in the place of the paper's, and `chassis` another robot in the place of the mecanum one that `plant` describes.
+    There are as many robots as the scheme has bodies, or `robots`, of which the others send nothing.
     Raises MtmError when the key does not fit this world or the spans make no sense.
     """
 
@@ -56,16 +58,14 @@ class RunSettings:
     unix_s: float | None = None
     task: TaskFactory = go_to_goal
     chassis: ChassisFactory | None = None
+    robots: int | None = None
 
     def __post_init__(self) -> None:
-        scheme = self.key.scheme
-        if len(scheme.channels) != ROBOTS:
-            raise MtmError(
-                f"the key's scheme has {len(scheme.channels)} channels and this world {ROBOTS} robots; make a key "
-                "with mtm-onboard keygen --preset robomaster-fleet"
-            )
-        if len({channel.body for channel in scheme.channels}) != ROBOTS:
-            raise MtmError("two channels of the key's scheme move the same body; give each robot one channel")
+        robots, bodies = len(self.names), len(self._bodies)
+        if self.robots is not None and self.robots < bodies:
+            raise MtmError(f"the key's scheme moves {bodies} bodies; give --robots {bodies} or more, or another key")
+        if robots > MOST_ROBOTS:
+            raise MtmError(f"{robots} robots do not fit into the arena; it holds {MOST_ROBOTS}")
         if not (self.start_s >= 0.0 and self.onset_s < self.seconds < np.inf):
             raise MtmError(
                 f"the run lasts {self.seconds:g} s and its message begins at {self.onset_s:g} s; make it last longer"
@@ -75,6 +75,23 @@ class RunSettings:
         self.message()
         if self.seed < 0:
             raise MtmError(f"the seed is {self.seed}; give a whole number from 0 on")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The robots: the scheme's bodies in its order, and then those that send nothing."""
+        bodies = self._bodies
+        others = (name for number in count() if (name := f"robot{number}") not in bodies)
+        return (*bodies, *islice(others, max(0, (self.robots or 0) - len(bodies))))
+
+    def channels(self, name: str) -> tuple[Channel, ...]:
+        """What the robot of that name plays: the channels of its body that the key holds."""
+        grant = self.key.holding.grant
+        own = (channel for channel in self.key.scheme.channels if channel.body == name)
+        return tuple(channel for channel in own if grant is None or channel.name in grant.channels)
+
+    @property
+    def _bodies(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(channel.body for channel in self.key.scheme.channels))
 
     @property
     def first_slot(self) -> int:
@@ -113,13 +130,13 @@ class Seeds:
 
     def permutation(self) -> tuple[int, ...]:
         """Which target each robot drives to in the end."""
-        return random_permutation(np.random.default_rng(self.world))
+        return random_permutation(np.random.default_rng(self.world), len(self.slips))
 
 
-def seeds_of(seed: int) -> Seeds:
-    """The sources that one integer gives."""
+def seeds_of(seed: int, robots: int = ROBOTS) -> Seeds:
+    """The sources that one integer gives; a robot's are the same however many there are."""
     slips, world, sensors = np.random.SeedSequence(seed).spawn(3)
-    return Seeds(tuple(int(word) for word in slips.generate_state(ROBOTS, np.uint64)), world, sensors)
+    return Seeds(tuple(int(word) for word in slips.generate_state(robots, np.uint64)), world, sensors)
 
 
 @dataclass(frozen=True, kw_only=True)

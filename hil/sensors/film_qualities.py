@@ -61,18 +61,20 @@ FILM_QUALITIES: dict[str, FilmQuality] = {
 }
 
 
-def write_quality(frames: Iterable[Frame], path: Path, rate_hz: float, quality: FilmQuality) -> int:
+def write_quality(
+    frames: Iterable[Frame], path: Path, rate_hz: float, quality: FilmQuality, began_unix_s: float | None = None
+) -> int:
     """Write the frames of a camera of that rate as such a film; returns the number of those written.
 
     Raises MtmError as `encode_video` does.
     """
     if quality.copy_of is None:
-        return encode_video(_taken(frames, quality), path, rate_hz / quality.every, quality.encoding)
+        return encode_video(_taken(frames, quality), path, rate_hz / quality.every, quality.encoding, began_unix_s)
     with TemporaryDirectory() as folder:
         first = Path(folder) / "first.mp4"
         write_quality(frames, first, rate_hz, quality.copy_of)
         pictures = read_frames(first, "bgr")
-        return encode_video(_taken(pictures, quality), path, rate_hz / quality.every, quality.encoding)
+        return encode_video(_taken(pictures, quality), path, rate_hz / quality.every, quality.encoding, began_unix_s)
 
 
 def _taken(frames: Iterable[Frame], quality: FilmQuality) -> Iterator[Frame]:

@@ -1,6 +1,7 @@
 """Writing video whose time stamps are the camera's own."""
 
 from collections.abc import Iterable
+from datetime import UTC, datetime
 from fractions import Fraction
 from pathlib import Path
 
@@ -21,19 +22,30 @@ MUXER = {"movflags": "faststart", "movie_timescale": str(TIME_BASE.denominator)}
 BGR_TO_UV = np.array([[0.439, -0.291, -0.148, 128], [-0.071, -0.368, 0.439, 128]])
 
 
-def write_video(frames: Iterable[Frame], path: Path, nominal_rate_hz: float = 30.0, crf: int = 18) -> int:
+def write_video(
+    frames: Iterable[Frame],
+    path: Path,
+    nominal_rate_hz: float = 30.0,
+    crf: int = 18,
+    began_unix_s: float | None = None,
+) -> int:
     """Encode `frames` as `encode_video` does, as H.264 at constant quality `crf`."""
-    return encode_video(frames, path, nominal_rate_hz, constant_quality(crf))
+    return encode_video(frames, path, nominal_rate_hz, constant_quality(crf), began_unix_s)
 
 
-def encode_video(frames: Iterable[Frame], path: Path, nominal_rate_hz: float, encoding: Encoding) -> int:
+def encode_video(
+    frames: Iterable[Frame], path: Path, nominal_rate_hz: float, encoding: Encoding, began_unix_s: float | None = None
+) -> int:
     """Encode `frames` (blue, green, red) into MP4; returns their number.
 
     Each frame keeps its own time, to 1/90000 s, so irregular and dropped frames survive; `nominal_rate_hz` only
-    guides the encoder. Raises MtmError when there is no frame, a size is odd, or times do not increase.
+    guides the encoder. The file says when it began, to a second, where that is known. Raises MtmError when there is no
+    frame, a size is odd, or times do not increase.
     """
     count = 0
     with replacing(path) as temporary, av.open(str(temporary), "w", format="mp4", options=MUXER) as container:
+        if began_unix_s is not None:
+            container.metadata["creation_time"] = datetime.fromtimestamp(began_unix_s, UTC).isoformat()
         stream = container.add_stream(encoding.codec, rate=Fraction(nominal_rate_hz).limit_denominator(1001))
         assert isinstance(stream, av.VideoStream)
         stream.time_base = stream.codec_context.time_base = TIME_BASE

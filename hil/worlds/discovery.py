@@ -7,7 +7,8 @@ every tick. A velocity command becomes the force under which the agent settles t
 its command with a lag of a few ticks.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,6 +50,23 @@ _START_M = 0.8
 _START_DISTANCE_M = 0.2
 
 
+@dataclass(frozen=True)
+class Tick:
+    """What stands between the computer and the motors in one tick of a batch of rollouts, (rollouts, 2) each.
+
+    `base_mps` is the controller's command, `requested_mps` the same with the noise, `positions_m` where the agents are.
+    """
+
+    number: int
+    base_mps: Floats
+    requested_mps: Floats
+    positions_m: Floats
+
+
+# What goes to the motors in the place of what was requested.
+Tamper = Callable[[Tick], Floats]
+
+
 class Discovery:
     """The world Discovery; nothing but the start is random."""
 
@@ -62,11 +80,15 @@ class Discovery:
 
     def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
         """One rollout of one shot for each seed; raises MtmError when the arrays disagree or a goal does not exist."""
+        return self.run_tampered(goals, noise, seeds, lambda tick: tick.requested_mps)
+
+    def run_tampered(self, goals: Integers, noise: Floats, seeds: Sequence[int], tamper: Tamper) -> list[Rollout]:
+        """The same with somebody between the computer and the motors, asked once a tick and in order."""
         _check(goals, noise, seeds, self.choices)
         starts_m = np.array([_start(np.random.default_rng(seed)) for seed in seeds])
         ticks = noise.shape[2]
         pursued_m = np.repeat(GOAL_LOCATIONS_M[goals], ticks, axis=1)
-        positions_m, histories = _drive(starts_m, pursued_m, noise.reshape(len(seeds), -1, 2))
+        positions_m, histories = _drive(starts_m, pursued_m, noise.reshape(len(seeds), -1, 2), tamper)
         times_s = np.arange(positions_m.shape[1]) / RATE_HZ
         return [
             Rollout((Shot(0, times_s, own_m),), control) for own_m, control in zip(positions_m, histories, strict=True)
@@ -78,7 +100,8 @@ class Discovery:
         starts_m = np.array([_start(generator) for generator in generators])
         goals = np.array([[generator.integers(self.choices)] for generator in generators])
         _check(goals, noise[:, None], seeds, self.choices)
-        _, histories = _drive(starts_m, np.repeat(GOAL_LOCATIONS_M[goals], noise.shape[1], axis=1), noise)
+        pursued_m = np.repeat(GOAL_LOCATIONS_M[goals], noise.shape[1], axis=1)
+        _, histories = _drive(starts_m, pursued_m, noise, lambda tick: tick.requested_mps)
         return histories
 
     def pictures(self, shot: Shot) -> Iterator[Frame]:
@@ -116,7 +139,7 @@ def _start(generator: np.random.Generator) -> Floats:
             return np.asarray(start_m)
 
 
-def _drive(starts_m: Floats, goals_m: Floats, noise: Floats) -> tuple[Floats, list[ControlHistory]]:
+def _drive(starts_m: Floats, goals_m: Floats, noise: Floats, tamper: Tamper) -> tuple[Floats, list[ControlHistory]]:
     """Positions (rollouts, ticks + 1, 2) and histories of one batch; `goals_m` and `noise` are (rollouts, ticks, 2)."""
     import torch
 
@@ -128,7 +151,9 @@ def _drive(starts_m: Floats, goals_m: Floats, noise: Floats) -> tuple[Floats, li
     base, sent = np.empty_like(noise), np.empty_like(noise)
     for tick in range(noise.shape[1]):
         base[:, tick] = _steer(positions_m[-1], goals_m[:, tick])
-        sent[:, tick] = np.clip(base[:, tick] + noise[:, tick], -LIMIT_MPS, LIMIT_MPS)
+        asked_mps = base[:, tick] + noise[:, tick]
+        driven_mps = tamper(Tick(tick, base[:, tick], asked_mps, positions_m[-1]))
+        sent[:, tick] = np.clip(driven_mps, -LIMIT_MPS, LIMIT_MPS)
         agent.action.u = torch.tensor(FORCE_PER_MPS * sent[:, tick], dtype=torch.float32)
         env.scenario.env_process_action(agent)
         env.world.step()

@@ -5,6 +5,7 @@ from importlib.util import find_spec
 
 from hil.worlds.world import World
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.errors import WrongValueError
 from mtm_onboard.protocol.installing import install_command
 
 # The module and class of each, and the packages of its simulator.
@@ -20,7 +21,7 @@ NAMES = tuple(_MODULES)
 def make_world(name: str) -> World:
     """The world of that name; raises MtmError that lists them, or says what its simulator needs."""
     if name not in _MODULES:
-        raise MtmError(f"there is no world {name!r}; choose one of: {', '.join(NAMES)}")
+        raise WrongValueError(f"there is no world {name!r}; choose one of: {', '.join(NAMES)}")
     module, kind, packages = _MODULES[name]
     # Looked for and not imported: VMAS and torch take seconds, and are imported when the world is run.
     missing = [package for package in packages if find_spec(package) is None]

@@ -15,6 +15,8 @@ import numpy as np
 
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import Channel, Scheme
+from mtm_onboard.protocol.framing import Framing
+from mtm_onboard.protocol.framing.framing import PayloadKind
 
 ROBOTS = 4
 BASE_SPEED_MPS = 0.5
@@ -27,10 +29,18 @@ _SWEEP_M = 2.4
 _FIRST_Y_M = -1.9
 _RISE_M = 0.5
 _TARGET_Y_M = 2.0
+# More robots than a row holds stand in rows behind each other, as many as the arena holds.
+_ROW_M = 0.45
+MOST_ROBOTS = 12
+# Of the scheme that keys are made for here: windows as in the key generator's preset, a third of the symbols parity.
+_WINDOW_TICKS = 200
+_SYMBOL_BITS = 4
+_NUMBER_BITS, _TAG_BITS = 4, 24
+_SYMBOLS_A_DATA_SYMBOL = 4.0 / 3.0
 
 
 def fleet_scheme(message_ticks: int = 600) -> Scheme:
-    """The paper's scheme for this world, and the key generator's preset `robomaster-fleet`: M = 4, split, sigma 0.1."""
+    """The paper's scheme for this world, the key generator's preset `paper-robomaster-fleet`: M = 4, sigma 0.1."""
     names = [f"robot{number}" for number in range(ROBOTS)]
     channels = tuple(Channel(name, name, ("vx", "vy"), 1, 0.1) for name in names)
     return Scheme(
@@ -41,6 +51,27 @@ def fleet_scheme(message_ticks: int = 600) -> Scheme:
         message_ticks=message_ticks,
         channels=channels,
     )
+
+
+def tagged_scheme(robots: int = ROBOTS, payload: PayloadKind = "integer", payload_bits: int = 8) -> Scheme:
+    """A rolling scheme with a tag for so many robots; by default that of the key generator's preset."""
+    data_symbols = math.ceil((payload_bits + _NUMBER_BITS + _TAG_BITS) / _SYMBOL_BITS)
+    each = math.ceil(data_symbols * _SYMBOLS_A_DATA_SYMBOL / robots)
+    names = [f"robot{number}" for number in range(robots)]
+    return Scheme(
+        name="robomaster-fleet",
+        rate_hz=50.0,
+        band_hz=(0.5, 5.0),
+        alphabet_size=1 << _SYMBOL_BITS,
+        message_ticks=_WINDOW_TICKS * each,
+        channels=tuple(Channel(name, name, ("vx", "vy"), each, 0.1) for name in names),
+        power="window",
+        schedule="rolling",
+        framing=Framing(
+            payload, payload_bits, number_bits=_NUMBER_BITS, check="tag", check_bits=_TAG_BITS, code="reed-solomon",
+            interleave=True,
+        ),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -70,20 +101,24 @@ def go_to_goal(route: Route, _seed: int) -> Task:
 
 def routes(permutation: tuple[int, ...]) -> tuple[Route, ...]:
     """One route a robot: the zigzag, then target number `permutation[robot]` on the top edge."""
-    return tuple(_route(robot, target) for robot, target in enumerate(permutation))
+    rows = math.ceil(len(permutation) / ROBOTS)
+    return tuple(_route(robot, target, rows) for robot, target in enumerate(permutation))
 
 
-def random_permutation(generator: np.random.Generator) -> tuple[int, ...]:
-    """Which of the four targets each robot drives to."""
-    return tuple(int(target) for target in generator.permutation(ROBOTS))
+def random_permutation(generator: np.random.Generator, robots: int = ROBOTS) -> tuple[int, ...]:
+    """Which of the four targets of its row each robot drives to."""
+    rows = math.ceil(robots / ROBOTS)
+    targets = [int(target) for _ in range(rows) for target in generator.permutation(ROBOTS)]
+    return tuple(targets[:robots])
 
 
-def _route(robot: int, target: int) -> Route:
-    lane_m = (robot - (ROBOTS - 1) / 2.0) * _SPACING_M
+def _route(robot: int, target: int, rows: int) -> Route:
+    row, place = divmod(robot, ROBOTS)
+    lane_m, first_y_m = (place - (ROBOTS - 1) / 2.0) * _SPACING_M, _FIRST_Y_M + _ROW_M * row
     sides = (1.0, -1.0) * 3
-    zigzag = tuple((lane_m + side * _SWEEP_M / 2.0, _FIRST_Y_M + _RISE_M * (leg + 1)) for leg, side in enumerate(sides))
-    end = ((target - (ROBOTS - 1) / 2.0) * 1.2, _TARGET_Y_M)
-    return Route((lane_m, _FIRST_Y_M), (*zigzag, end))
+    zigzag = tuple((lane_m + side * _SWEEP_M / 2.0, first_y_m + _RISE_M * (leg + 1)) for leg, side in enumerate(sides))
+    end = ((target - (ROBOTS - 1) / 2.0) * 1.2, _TARGET_Y_M - _ROW_M * (rows - 1 - row))
+    return Route((lane_m, first_y_m), (*zigzag, end))
 
 
 class GoToGoal:

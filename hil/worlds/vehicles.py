@@ -12,7 +12,7 @@ from hil.plants.responses import Floats
 from hil.worlds.open_loop import cruise, pick_and_place, spinning, steering, stop_and_go, wander, zigzag
 from hil.worlds.robomaster import TaskFactory, go_to_goal
 from hil.worlds.tasks import TASKS, spin_to_goal, steer_to_goal
-from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.errors import WrongValueError
 
 # From the number of steps and their length to demanded body velocities (n, 3).
 Controller = Callable[[int, float, np.random.Generator], Floats]
@@ -63,7 +63,9 @@ def vehicle(name: str) -> Vehicle:
         steered = "vy" not in kind.axes
         return Vehicle(kind, (steering,) if steered else _COURSES, steer_to_goal if steered else go_to_goal)
     if name not in VEHICLES:
-        raise MtmError(f"there is no plant {name!r}; choose from: {', '.join(VEHICLES)}, or name a plant file (.toml)")
+        raise WrongValueError(
+            f"there is no plant {name!r}; choose from: {', '.join(VEHICLES)}, or name a plant file (.toml)"
+        )
     return VEHICLES[name]
 
 
@@ -72,5 +74,7 @@ def arena_task(name: str) -> TaskFactory:
     task = vehicle(name).task
     if task is None:
         able = [other for other, own in VEHICLES.items() if own.task is not None]
-        raise MtmError(f"the plant {name!r} does not drive through the fleet's arena; choose from: {', '.join(able)}")
+        raise WrongValueError(
+            f"the plant {name!r} does not drive through the fleet's arena; choose from: {', '.join(able)}"
+        )
     return task

@@ -7,27 +7,36 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress
 
 from mtm_audit.commands.opened_key import KeySource, OpenedKey, opened_key
-from mtm_audit.commands.several import run_each
-from mtm_audit.decoding.decode import decode_tracks
+from mtm_audit.commands.several import check_together, run_each
+from mtm_audit.commands.unused import unused_options
 from mtm_audit.decoding.decoding import Decoding
+from mtm_audit.decoding.recorded import decode_recording, recorded_of
 from mtm_audit.decoding.settings import DecodeSettings
-from mtm_audit.decoding.speeds import at_speed, check_speed, decode_at_speeds, played
+from mtm_audit.decoding.speeds import check_speed
+from mtm_audit.decoding.together import decode_together
 from mtm_audit.detectors import make_detector
-from mtm_audit.ingest.films import film_compression, film_length
+from mtm_audit.ingest.films import film_length
 from mtm_audit.ingest.recording import read_recording
-from mtm_audit.ingest.source import Source, sources_of
+from mtm_audit.ingest.source import Source, recordings_of, sources_of
+from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.recording import Recording
 from mtm_audit.model.stage import StageError, stage
 from mtm_audit.readers.logs.options import ReadOptions
+from mtm_audit.readers.video.clock import EvenClock
 from mtm_audit.reporting.json_report import json_report
+from mtm_audit.reporting.overlay.files import OverlayFiles, check_pictures, draw_overlay
 from mtm_audit.reporting.remarks import remarks
+from mtm_audit.reporting.report.provenance import ReportRequest
 from mtm_audit.reporting.stages import Stage, stages_of_decoding, stages_of_recording, text_of_stages
 from mtm_audit.reporting.text import print_report
 from mtm_audit.tracking.registry import tracker
+from mtm_onboard.protocol.errors import command_line_values
 from mtm_onboard.protocol.key import Key
+from mtm_onboard.protocol.output_file import check_outputs
 
 PIPE_COLUMNS = 140
 EXIT_CODES = {"decoded": 0, "absent": 3, "inconclusive": 4}
@@ -38,7 +47,9 @@ class DecodeOptions:
     """What the command line asked for; `plot` None draws nothing, `reading` is how to read logs.
 
     `frame_rate_hz` replaces the times of films; `speed` is how many times as fast the recording is played, None to
-    search for it.
+    search for it. `overlay` is what to draw over the film; `report` None writes no page. With `together` all recordings
+    show one message; `each_at` says when each was made, empty where the files do. `given` are the names of options that
+    were given and may not matter, see `unused_options`.
     """
 
     paths: tuple[Path, ...]
@@ -52,6 +63,12 @@ class DecodeOptions:
     reading: ReadOptions = field(default_factory=ReadOptions)
     frame_rate_hz: float | None = None
     speed: float | None = 1.0
+    report: ReportRequest | None = None
+    force: bool = False
+    overlay: OverlayFiles = field(default_factory=OverlayFiles)
+    together: bool = False
+    each_at: tuple[RecordedAt, ...] = ()
+    given: frozenset[str] = frozenset()
 
 
 def run_decode(options: DecodeOptions) -> int:
@@ -67,11 +84,18 @@ def run_decode(options: DecodeOptions) -> int:
         key = opened.key
         stages.append(Stage("key", (f"{key.id}, scheme {key.scheme.name} (fingerprint {key.scheme.fingerprint})",)))
         with stage("recording"):
-            sources = sources_of(options.paths)
+            sources = recordings_of(options.paths) if options.together else sources_of(options.paths)
+            check_pictures(options.overlay, sources)
+    if options.together:
+        check_together(len(sources), len(options.each_at), options.settings.onset_s, options.speed)
+        with _explained(options, stages):
+            text, code = _told(options, opened, stages, *_decode_together(options, opened, sources, stages))
+        sys.stdout.write(text)
+        return code
     if len(sources) > 1:
-        return run_each(
-            sources, options.plot, options.as_json, lambda source: _report(options, opened, source, stages[:1])
-        )
+        report = ("--report",) if options.report else ()
+        single = (*(("--plot",) if options.plot else ()), *report)
+        return run_each(sources, single, options.as_json, lambda source: _report(options, opened, source, stages[:1]))
     text, code = _report(options, opened, sources[0], stages)
     sys.stdout.write(text)
     return code
@@ -80,12 +104,21 @@ def run_decode(options: DecodeOptions) -> int:
 def _check(options: DecodeOptions) -> None:
     """Refuse what would fail after the long work."""
     make_detector(options.settings.detector, options.settings.profile)
-    tracker(options.tracker)
-    check_speed(1.0 if options.speed is None else options.speed)
+    with command_line_values():
+        tracker(options.tracker)
+        check_speed(1.0 if options.speed is None else options.speed)
+        if options.frame_rate_hz is not None:
+            EvenClock(options.frame_rate_hz)
+    page = None if options.report is None else options.report.path
+    check_outputs("mtm-audit decode", options.plot, page, *options.overlay.paths, force=options.force)
     if options.plot is not None:
         from mtm_audit.reporting.plot import check_plot_path
 
         check_plot_path(options.plot)
+    if page is not None:
+        from mtm_audit.reporting.report.page import check_report_path
+
+        check_report_path(page)
 
 
 @contextmanager
@@ -95,7 +128,9 @@ def _explained(options: DecodeOptions, stages: Sequence[Stage]) -> Iterator[None
         yield
     except StageError as error:
         if options.explain:
-            sys.stderr.write(text_of_stages([*stages, Stage(error.stage, (str(error),), failed=True)]))
+            sys.stderr.write(
+                text_of_stages([*stages, Stage(error.stage, (str(error),), failed=True, says_what_to_do=True)])
+            )
         raise
 
 
@@ -103,6 +138,12 @@ def _report(options: DecodeOptions, opened: OpenedKey, source: Source, stages: l
     """Decode one recording: what to print of it, and its exit code."""
     with _explained(options, stages):
         recording, decoding = _decode(options, opened, source, stages)
+    return _told(options, opened, stages, recording, decoding)
+
+
+def _told(
+    options: DecodeOptions, opened: OpenedKey, stages: list[Stage], recording: Recording, decoding: Decoding
+) -> tuple[str, int]:
     explanation = ""
     if options.explain:
         explanation = text_of_stages([*stages, *stages_of_decoding(decoding)]) + "\n"
@@ -110,69 +151,83 @@ def _report(options: DecodeOptions, opened: OpenedKey, source: Source, stages: l
         # Beside JSON the explanation must not get into what a program reads.
         sys.stderr.write(explanation)
         explanation = ""
-    return explanation + _publish(options, opened, recording, decoding), EXIT_CODES[decoding.verdict]
+    return explanation + _publish(options, opened, recording, decoding, stages), EXIT_CODES[decoding.verdict]
 
 
 def _decode(
     options: DecodeOptions, opened: OpenedKey, source: Source, stages: list[Stage]
 ) -> tuple[Recording, Decoding]:
     """Run the chain and tell each stage that is done; a refusal names the stage that could not go on."""
-    files, kind = source.files, source.kind
     with _progress() as progress:
-        with stage("recording"):
-            frames = film_length(files) if kind == "video" else None
-        if kind == "video":
-            stages.append(Stage("recording", (f"video {source.name}, {frames or 'an unknown number of'} frames",)))
-        task = progress.add_task(f"tracking {files[0].name}", total=frames, visible=kind == "video")
-        with stage("tracks" if kind == "video" else "recording"):
-            recording = read_recording(
-                files,
-                kind,
-                options.tracker,
-                lambda done: progress.update(task, completed=done),
-                options=options.reading,
-                frame_rate_hz=options.frame_rate_hz,
-                reference=options.reference,
-            )
-            recording = replace(recording, warnings=(*source.warnings, *recording.warnings))
-        progress.remove_task(task)
-        stages[1:] = stages_of_recording(recording)
-        opened.check_before_public(options.settings.at or recording.at)
+        recording = _recorded(options, opened, source, stages, progress)
         return _read(recording, opened.key, options, progress)
 
 
-def _read(recording: Recording, key: Key, options: DecodeOptions, progress: Progress) -> tuple[Recording, Decoding]:
-    """The decoding, and the recording at the speed at which it was decoded; of a film with its compression.
+def _decode_together(
+    options: DecodeOptions, opened: OpenedKey, sources: Sequence[Source], stages: list[Stage]
+) -> tuple[Recording, Decoding]:
+    """The chain for recordings of one message; the recording is the one that shows most."""
+    with _progress() as progress:
+        recordings = []
+        for number, source in enumerate(sources):
+            timed = options
+            if options.each_at:
+                timed = replace(options, settings=replace(options.settings, at=options.each_at[number]))
+            recordings.append((timed, _recorded(timed, opened, source, stages, progress)))
+        task = progress.add_task("reading", total=1.0)
 
-    That is what may have kept the message from being read, so it is not looked at when it was.
-    """
+        def show(stage: str, fraction: float) -> None:
+            progress.update(task, description=stage, completed=fraction)
+
+        asked = [recorded_of(recording, timed.settings, timed.speed or 1.0) for timed, recording in recordings]
+        decoding, number = decode_together(asked, opened.key, show)
+    shown = recordings[number][1]
+    warnings = tuple(warning for _, recording in recordings for warning in recording.warnings)
+    names = tuple(source.name for source in sources)
+    return replace(shown, tracks=asked[number].tracks, warnings=warnings, together=names), decoding
+
+
+def _recorded(
+    options: DecodeOptions, opened: OpenedKey, source: Source, stages: list[Stage], progress: Progress
+) -> Recording:
+    """The recording behind a source, its tracks found."""
+    files, kind = source.files, source.kind
+    with stage("recording"):
+        frames = film_length(files) if kind == "video" else None
+    if kind == "video":
+        stages.append(Stage("recording", (f"video {source.name}, {frames or 'an unknown number of'} frames",)))
+    task = progress.add_task(f"tracking {escape(files[0].name)}", total=frames, visible=kind == "video")
+    with stage("tracks" if kind == "video" else "recording"):
+        recording = read_recording(
+            files,
+            kind,
+            options.tracker,
+            lambda done: progress.update(task, completed=done),
+            options=options.reading,
+            frame_rate_hz=options.frame_rate_hz,
+            reference=options.reference,
+        )
+        unused = unused_options(options.given, kind, opened.key.scheme.schedule)
+        recording = replace(recording, warnings=(*source.warnings, *unused, *recording.warnings))
+    progress.remove_task(task)
+    stages[1:] = stages_of_recording(recording)
+    opened.check_before_public(options.settings.at or recording.at)
+    return recording
+
+
+def _read(recording: Recording, key: Key, options: DecodeOptions, progress: Progress) -> tuple[Recording, Decoding]:
     task = progress.add_task("reading", total=1.0)
 
     def show(stage: str, fraction: float) -> None:
         progress.update(task, description=stage, completed=fraction)
 
-    given = options.settings.at
-    # What a person says of the recording's time comes before what the file says.
-    timed = replace(options.settings, at=recording.at if given is None else recording.begun_at(given))
-    tracks = recording.tracks
-    if options.speed is None:
-        speed, decoding = decode_at_speeds(tracks, key, timed, show)
-    else:
-        speed = options.speed
-        decoding = decode_tracks(played(tracks, speed), key, at_speed(timed, tracks, speed), show)
-    lost = recording.kind == "video" and decoding.verdict != "decoded"
-    shown = replace(
-        recording,
-        tracks=played(tracks, speed),
-        speed=speed,
-        speed_searched=options.speed is None,
-        compression=film_compression(recording.paths) if lost else None,
-    )
-    return shown, decoding
+    return decode_recording(recording, key, options.settings, options.speed, show)
 
 
-def _publish(options: DecodeOptions, opened: OpenedKey, recording: Recording, decoding: Decoding) -> str:
-    """Draw what is to be drawn; returns what is to be printed."""
+def _publish(
+    options: DecodeOptions, opened: OpenedKey, recording: Recording, decoding: Decoding, stages: Sequence[Stage]
+) -> str:
+    """Draw and write what is to be drawn; returns what is to be printed."""
     key_warning = () if opened.key.warning is None else (opened.key.warning,)
     warnings = (*remarks(recording, decoding), *key_warning)
     basis = opened.basis(recording, decoding, stated=options.settings.at is not None)
@@ -180,13 +235,32 @@ def _publish(options: DecodeOptions, opened: OpenedKey, recording: Recording, de
         from mtm_audit.reporting.plot import draw_plot
 
         draw_plot(recording, decoding, options.plot)
+    if options.overlay.options:
+        _draw_overlay(options, recording, decoding)
+    if options.report is not None:
+        from mtm_audit.reporting.report.page import write_report
+
+        write_report(
+            options.report, recording, decoding, warnings=warnings, basis=basis,
+            stages=[*stages, *stages_of_decoding(decoding)], tracker=options.tracker,
+        )  # fmt: skip
     if options.as_json:
         return json_report(recording, decoding, warnings, basis)
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
-    console = Console(width=None if sys.stdout.isatty() else PIPE_COLUMNS)
+    # What users name is printed as it is: a track may be called body[left].
+    console = Console(width=None if sys.stdout.isatty() else PIPE_COLUMNS, markup=False, emoji=False)
     with console.capture() as captured:
         print_report(console, recording, decoding, warnings, basis)
     return captured.get()
+
+
+def _draw_overlay(options: DecodeOptions, recording: Recording, decoding: Decoding) -> None:
+    with _progress() as progress:
+        task = progress.add_task("drawing", total=recording.frames)
+        draw_overlay(
+            recording, decoding, options.overlay, options.tracker, options.frame_rate_hz,
+            lambda done: progress.update(task, completed=done), force=options.force,
+        )  # fmt: skip
 
 
 def _progress() -> Progress:

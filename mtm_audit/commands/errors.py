@@ -15,7 +15,7 @@ _AGAIN_S = 5.0
 
 @contextmanager
 def reported(program: str, when_interrupted: str) -> Iterator[None]:
-    """Turn errors into `program: sentence` and exit code 1, an interrupt into `when_interrupted` and 130.
+    """Turn errors into `program: sentence` and their exit code, an interrupt into `when_interrupted` and 130.
 
     A request to terminate unwinds like any other exception, so that nothing half-written stays behind.
     """
@@ -28,7 +28,7 @@ def reported(program: str, when_interrupted: str) -> Iterator[None]:
         sys.stdout.flush()
     except MtmError as error:
         print(f"{program}: {error}", file=sys.stderr)
-        raise typer.Exit(1) from error
+        raise typer.Exit(error.exit_code) from error
     except BrokenPipeError as error:
         print(f"{program}: nobody reads the output any more, so its end is lost; let it be read", file=sys.stderr)
         _discard_output()

@@ -12,15 +12,17 @@ from mtm_audit.reporting.journal_summary import AXES, JournalSummary, summary_of
 from mtm_onboard.protocol.journal_file import JournalHeader, read_journal
 from mtm_onboard.protocol.journal_noise import with_noise
 from mtm_onboard.protocol.key import load_key
+from mtm_onboard.protocol.output_file import check_outputs
 
 _PIPE_COLUMNS = 140
 
 
-def run_journal(path: Path, *, as_json: bool, plot: Path | None, key: Path | None = None) -> None:
+def run_journal(path: Path, *, as_json: bool, plot: Path | None, key: Path | None = None, force: bool = False) -> None:
     """Read, draw, print, with the noise that the key makes again.
 
     Raises MtmError when there is no journal, no tick in it, another key's, or no picture can be written.
     """
+    check_outputs("mtm-audit journal", plot, force=force)
     if plot is not None:
         from mtm_audit.reporting.plot import check_plot_path
 
@@ -32,11 +34,11 @@ def run_journal(path: Path, *, as_json: bool, plot: Path | None, key: Path | Non
     if plot is not None:
         from mtm_audit.reporting.journal_plot import draw_journal
 
-        draw_journal(record, plot)
+        draw_journal(record, path, plot)
     if as_json:
         sys.stdout.write(json.dumps(summary.as_table(), indent=2, allow_nan=False) + "\n")
     else:
-        console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS)
+        console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS, markup=False)
         console.print(_table(summary), highlight=False)
 
 

@@ -15,11 +15,13 @@ from mtm_audit.planning.table import read_table
 from mtm_audit.reporting.plot import check_plot_path
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import load_key
+from mtm_onboard.protocol.output_file import check_outputs
 from mtm_onboard.protocol.scheme import Scheme
 from mtm_onboard.protocol.schemefile import save_scheme
 
 _PIPE_COLUMNS = 140
 DISAGREES = 4
+COMMAND = "mtm-audit plan"
 
 
 @dataclass(frozen=True)
@@ -34,10 +36,12 @@ class PlanOptions:
     check: Path | None
     plot: Path | None
     out: Path | None
+    force: bool = False
 
 
 def run_plan(options: PlanOptions) -> int:
     """Plan, report, write; returns 0, or 4 when held-out measurements disagree. Raises MtmError before writing."""
+    check_outputs(COMMAND, options.out, options.plot, force=options.force)
     if options.plot is not None:
         check_plot_path(options.plot)
     table = read_table(options.table)
@@ -55,13 +59,16 @@ def run_plan(options: PlanOptions) -> int:
 
         draw_plan(table, options.problem, found, rate_hz, options.plot)
     if options.out is not None and scheme is not None:
-        save_scheme(scheme, options.out, (headline(found, options.problem, rate_hz),))
+        save_scheme(scheme, options.out, (f"{COMMAND}: {headline(found, options.problem, rate_hz)}",))
     print(headline(found, options.problem, rate_hz))
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS)
+    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS, markup=False)
     console.print(rich_table(found, options.problem, rate_hz), highlight=False)
-    for line in (*lines, *(f"wrote {path}" for path in (options.out, options.plot) if path)):
-        print(line)
+    if scheme is not None:
+        lines.append(f"wrote {options.out}: scheme {scheme.name} (fingerprint {scheme.fingerprint})")
+    if options.plot is not None:
+        lines.append(f"wrote {options.plot}")
+    print("\n".join(lines))
     return 0 if all(one.agrees for one in checks) else DISAGREES
 
 

@@ -4,6 +4,7 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from mtm_audit.commands.unused import unused_options
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.decoding.settings import DecodeSettings
@@ -13,8 +14,9 @@ from mtm_audit.detectors.matched.profile import PlantProfile, save_profile
 from mtm_audit.ingest.recording import read_recording, recording_files
 from mtm_audit.readers.logs.options import ReadOptions
 from mtm_audit.tracking.registry import tracker
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import MtmError, command_line_values
 from mtm_onboard.protocol.key import Key, load_key
+from mtm_onboard.protocol.output_file import check_outputs
 
 
 @dataclass(frozen=True)
@@ -28,13 +30,15 @@ class ProfileOptions:
     reference: tuple[str, ...]
     settings: DecodeSettings
     reading: ReadOptions = field(default_factory=ReadOptions)
+    force: bool = False
+    given: frozenset[str] = frozenset()
 
 
 def run_profile(options: ProfileOptions) -> None:
     """Decode, learn, write. Raises MtmError when the recording does not decode, since its plant is then unknown."""
-    if not options.out.parent.is_dir():
-        raise MtmError(f"there is no folder {options.out.parent} to write the profile to; make it first")
-    tracker(options.tracker)
+    check_outputs("mtm-audit profile", options.out, force=options.force)
+    with command_line_values():
+        tracker(options.tracker)
     key = load_key(options.key)
     files, kind = recording_files(options.paths)
     recording = read_recording(files, kind, options.tracker, options=options.reading, reference=options.reference)
@@ -45,6 +49,8 @@ def run_profile(options: ProfileOptions) -> None:
             "record a longer message, or give its start with --onset"
         )
     save_profile(_learn(key, decoding), options.out)
+    for warning in unused_options(options.given, kind, key.scheme.schedule):
+        sys.stdout.write(f"warning: {warning}\n")
     sys.stdout.write(f"wrote {options.out}; give it to mtm-audit decode with --profile\n")
 
 

@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 from mtm_audit.ingest.source import Source
 from mtm_onboard.protocol.errors import MtmError
@@ -11,15 +10,15 @@ _ABSENT, _MIXED = 3, 4
 
 
 def run_each(
-    sources: Sequence[Source], plot: Path | None, as_json: bool, report: Callable[[Source], tuple[str, int]]
+    sources: Sequence[Source], single: Sequence[str], as_json: bool, report: Callable[[Source], tuple[str, int]]
 ) -> int:
     """Print each report under its recording's name, or all as one JSON array; returns the exit code of all.
 
-    1 when one could not be read, 0 when all are decoded, 3 when all are absent, else 4. Raises MtmError when a plot is
-    wanted, which shows one recording.
+    1 when one could not be read, 0 when all are decoded, 3 when all are absent, else 4. Raises MtmError when one of
+    the `single` options is given, each of which shows one recording.
     """
-    if plot is not None:
-        raise MtmError(f"--plot draws one recording, and {len(sources)} are named; name one")
+    if single:
+        raise MtmError(f"{single[0]} draws one recording, and {len(sources)} are named; name one")
     codes: list[int] = []
     texts: list[str] = []
     for source in sources:
@@ -37,6 +36,18 @@ def run_each(
     if as_json:
         sys.stdout.write("[" + ",\n".join(text.rstrip("\n") for text in texts) + "]\n")
     return _together(codes)
+
+
+def check_together(recordings: int, times: int, onset_s: float | None, speed: float | None) -> None:
+    """Raise MtmError unless so many recordings can be decoded together, for which so many times are given."""
+    if recordings < 2:
+        raise MtmError("--together needs two recordings or more; name them, each a film, a log or a folder of logs")
+    if onset_s is not None:
+        raise MtmError("--onset is an instant of one recording; leave it or --together out")
+    if speed is None:
+        raise MtmError("--search-speed looks at one recording; find its speed alone, and give it as --speed")
+    if times not in (0, recordings):
+        raise MtmError(f"--at says when {times} of {recordings} recordings began; name one time for each, with commas")
 
 
 def _together(codes: Sequence[int]) -> int:

@@ -179,7 +179,7 @@ def _report(watch: Watch, opened: OpenedKey, source: Source, answer: str) -> tup
     recording = Recording((Path(source.shown),), kind, best.tracks, best.warnings, watch.at)
     basis = opened.basis(recording, decoding, stated=True)
     key_warning = () if opened.key.warning is None else (opened.key.warning,)
-    console = Console(width=None if sys.stdout.isatty() else PIPE_COLUMNS)
+    console = Console(width=None if sys.stdout.isatty() else PIPE_COLUMNS, markup=False, emoji=False)
     with console.capture() as captured:
         print_report(console, recording, decoding, (*remarks(recording, decoding), *key_warning), basis)
     return captured.get() + _looks_sentence(watch, best) + "\n", EXIT_CODES[decoding.verdict]

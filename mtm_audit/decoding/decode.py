@@ -86,15 +86,18 @@ def _once(frames: Sequence[Delivered]) -> tuple[Delivered, ...]:
 def _judged_by_enough(
     tracks: Sequence[Track], key: Key, settings: DecodeSettings, progress: Progress | None
 ) -> Decoding:
-    decoding = _decoded(tracks, key, settings, progress)
+    decoding, _ = decoded_once(tracks, key, settings, progress)
     by_decoys = decoding.evidence.nats is None
     if not by_decoys or not settings.threshold < decoding.evidence.p_value <= NEARLY:
         return decoding
     more = replace(settings, decoys=MORE_DECOYS * settings.decoy_count)
-    return _decoded(tracks, key, more, progress)
+    return decoded_once(tracks, key, more, progress)[0]
 
 
-def _decoded(tracks: Sequence[Track], key: Key, settings: DecodeSettings, progress: Progress | None) -> Decoding:
+def decoded_once(
+    tracks: Sequence[Track], key: Key, settings: DecodeSettings, progress: Progress | None
+) -> tuple[Decoding, Readings]:
+    """The decoding of tracks as they are, all of them in one piece, and the readings that it rests on."""
     scheme = key.scheme
     with stage("detector"):
         detector = make_detector(settings.detector, settings.profile)
@@ -115,8 +118,10 @@ def _decoded(tracks: Sequence[Track], key: Key, settings: DecodeSettings, progre
     symbols, symbol_nats = _weighed_symbols(symbols, readings)
     # A frame read from a recording without a message would be chance, and a check of few bits would let some pass.
     if scheme.framing is not None and present:
-        frames = decode_frames(_heard(readings, scheme), scheme, key.secret, start.first_slot, order_known=order_known)
-        posteriors, symbols = _frame_symbols(frames[-1])
+        frames = decode_frames(
+            heard_of(readings, scheme), scheme, key.secret, start.first_slot, order_known=order_known
+        )
+        posteriors, symbols = symbols_of_frame(frames[-1])
         symbol_nats = (None,) * len(symbols)
     weighed = Decoding(
         verdict="absent",
@@ -135,7 +140,7 @@ def _decoded(tracks: Sequence[Track], key: Key, settings: DecodeSettings, progre
         settings=settings,
         frame=readings.frame,
     )
-    return judged(weighed, settings.threshold)
+    return judged(weighed, settings.threshold), readings
 
 
 def _weighed_symbols(
@@ -152,7 +157,8 @@ def _weighed_symbols(
     return better, tuple(None if weighed is None else weighed.nats for weighed in found)
 
 
-def _heard(readings: Readings, scheme: Scheme) -> list[Heard]:
+def heard_of(readings: Readings, scheme: Scheme) -> list[Heard]:
+    """The channels that could be read, for their frames."""
     return [
         Heard(channel, readings.channels[channel.name])
         for channel in scheme.channels
@@ -160,7 +166,7 @@ def _heard(readings: Readings, scheme: Scheme) -> list[Heard]:
     ]
 
 
-def _frame_symbols(frame: Delivered) -> tuple[Floats, tuple[int | None, ...]]:
+def symbols_of_frame(frame: Delivered) -> tuple[Floats, tuple[int | None, ...]]:
     """Posteriors (L, M) and decisions of a frame's symbols, each by itself."""
     ratios = frame.ratios
     seen = np.ptp(ratios, axis=1) > 0.0

@@ -61,7 +61,8 @@ class Decoding:
     the message repeats and nothing shows which of its symbols comes first. `frames` are the framed messages found, in
     the order in which they were sent, `message` being the last; a single one that does not hold is the best guess.
     `leaps` counts by track name the leaps that were taken out. `frame` is the one along whose axes motion was read,
-    and `piece` (begin, end) the part of a long recording that was, None for all of it.
+    and `piece` (begin, end) the part of a long recording that was, None for all of it. `together` are the decodings of
+    each recording where several were put together; the channels are then those of the one that shows most.
     """
 
     verdict: VerdictName
@@ -81,6 +82,7 @@ class Decoding:
     leaps: Mapping[str, int] = field(default_factory=dict)
     frame: ReferenceFrame = "world"
     piece: tuple[float, float] | None = None
+    together: tuple["Decoding", ...] = ()
 
     @property
     def uncertain(self) -> tuple[int, ...]:

@@ -16,7 +16,7 @@ from mtm_audit.model.glimpse import Glimpse, glimpse_of_track
 from mtm_audit.model.reference_frame import ReferenceFrame
 from mtm_audit.model.stage import stage
 from mtm_audit.model.track import Floats, Track
-from mtm_audit.significance.channel_terms import channel_terms
+from mtm_audit.significance.channel_terms import ChannelTerms, channel_terms
 from mtm_audit.significance.decoys import compare, decoy_codebooks
 from mtm_audit.significance.evidence import Evidence, needed_nats
 from mtm_audit.significance.message_evidence import MessageEvidence, weigh_message
@@ -39,11 +39,21 @@ def part_of(progress: Progress | None, what: str, number: int, count: int) -> Pr
     return lambda stage, fraction: progress(f"{what} {number + 1} of {count}: {stage}", (number + fraction) / count)
 
 
+@dataclass(frozen=True)
+class WeighedPart:
+    """A part of a channel on some of its axes, and the log prior probability of its track."""
+
+    axes: tuple[str, ...]
+    terms: ChannelTerms
+    cost: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class Readings:
     """`channels` by name, those that could be read, and `refusals` why others could not; `message` the exact evidence,
     None from a detector that gives none, and `channel_nats` by channel name; `also_shows` by track name which channel
-    its motion plays, where tracks were compared. `frame` is the one whose axes the motion was read along.
+    its motion plays, where tracks were compared. `frame` is the one whose axes the motion was read along; `weighed` is
+    what the evidence was made of.
     """
 
     association: Association
@@ -54,6 +64,7 @@ class Readings:
     message: MessageEvidence | None
     channel_nats: Mapping[str, float]
     also_shows: Mapping[str, str]
+    weighed: Sequence[WeighedPart]
 
 
 def read_tracks(
@@ -97,6 +108,7 @@ class _View:
     frame: ReferenceFrame
     parts: Mapping[str, Sequence[Part]]
     refusals: Mapping[str, MtmError]
+    weighed: Sequence[WeighedPart]
     message: MessageEvidence | None
     strengths: Floats
 
@@ -147,6 +159,7 @@ class _Reader:
             message=message,
             channel_nats={} if message is None else message.channels_nats,
             also_shows=also_shows or {},
+            weighed=[replace(part, cost=part.cost - math.log(len(frames))) for part in best.weighed],
         )
 
     def _view(self, channels: Sequence[Channel], association: Association, frame: ReferenceFrame) -> _View:
@@ -166,26 +179,40 @@ class _Reader:
                 read.setdefault(observation.channel.name, []).append(Part(observation.channel, result))
         log_evidence = self.detector.strength_law == "log evidence"
         parts = {name: together(each, log_evidence=log_evidence) for name, each in read.items()}
+        weighed = self._weighed(parts, association)
         return _View(
             frame=frame,
             parts=parts,
             refusals={name: refusal for name, refusal in refusals.items() if name not in parts},
-            message=self._message(parts, association) if parts else None,
+            weighed=weighed,
+            message=self._message(weighed) if weighed else None,
             strengths=_strengths(self.scheme, parts, association) if parts else np.zeros(len(self.codebooks)),
         )
 
-    def _message(self, parts: Mapping[str, Sequence[Part]], association: Association) -> MessageEvidence | None:
-        """The exact evidence, with the choice of tracks paid for; None without prepared motions."""
+    def _weighed(self, parts: Mapping[str, Sequence[Part]], association: Association) -> list[WeighedPart]:
+        """What exact evidence is made of, with the choice of tracks paid for; none without prepared motions."""
         flat = [part for each in parts.values() for part in each]
         if any(part.result.prepared is None for part in flat):
-            return None
+            return []
         scheme = self.scheme
         apart = scheme.framing is not None and scheme.schedule == "rolling"
-        terms = [
-            channel_terms(self.codebooks[0], part.channel, part.result, self.start.onset, apart=apart) for part in flat
+        return [
+            WeighedPart(
+                part.channel.axes,
+                channel_terms(self.codebooks[0], part.channel, part.result, self.start.onset, apart=apart),
+                association.log_priors[part.channel.body],
+            )
+            for part in flat
         ]
-        costs = [association.log_priors[part.channel.body] for part in flat]
-        return weigh_message(terms, costs, scheme.message_symbols, symbols=scheme.framing is None)
+
+    def _message(self, weighed: Sequence[WeighedPart]) -> MessageEvidence:
+        scheme = self.scheme
+        return weigh_message(
+            [part.terms for part in weighed],
+            [part.cost for part in weighed],
+            scheme.message_symbols,
+            symbols=scheme.framing is None,
+        )
 
     def in_doubt(self, readings: Readings) -> list[str]:
         """Bodies with a channel whose motion does not show its symbols, or that no track shows."""

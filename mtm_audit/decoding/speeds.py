@@ -10,7 +10,7 @@ from mtm_audit.decoding.paid import paid_for, worth
 from mtm_audit.decoding.readings import Progress, part_of
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.track import Track
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import MtmError, WrongValueError
 from mtm_onboard.protocol.key import Key
 
 # Cameras film slow motion and time lapse at powers of two and at 120, 60, 50, 25 or 24 frames a second shown at 24, 25
@@ -23,7 +23,7 @@ _CLOCK_ERROR = 0.02
 def check_speed(speed: float) -> None:
     """Raise MtmError unless something can be played that many times as fast."""
     if not (math.isfinite(speed) and speed > 0.0):
-        raise MtmError(f"a recording cannot be played {speed} times as fast; give a number above zero")
+        raise WrongValueError(f"a recording cannot be played {speed} times as fast; give a number above zero")
 
 
 def played(tracks: Sequence[Track], speed: float) -> tuple[Track, ...]:

@@ -22,9 +22,11 @@ def start_of(scheme: Scheme, tracks: Iterable[Track], onset_s: float | None, at:
     """What to search for: under the rolling schedule the slots that the recording may show, by its time.
 
     An onset that is given names the slot that begins nearest to it. Under the fixed schedule time does not matter.
-    Raises MtmError when the rolling schedule is used and nobody says when the recording was made, and when no slot
-    begins near the given onset.
+    Raises MtmError when the onset comes after the end, when the rolling schedule is used and nobody says when the
+    recording was made, and when no slot begins near the given onset.
     """
+    tracks = tuple(tracks)
+    _check_within(tracks, onset_s)
     if scheme.schedule == "fixed":
         return Start(0, onset_s)
     if at is None:
@@ -38,6 +40,15 @@ def start_of(scheme: Scheme, tracks: Iterable[Track], onset_s: float | None, at:
     slot = max(0, slot_at(at.unix_s + first_s - at.error_s, scheme))
     nominal_s = slot_start_unix_s(slot, scheme) - at.unix_s
     return Start(slot, OnsetRange(nominal_s - at.error_s, nominal_s + at.error_s))
+
+
+def _check_within(tracks: Iterable[Track], onset_s: float | None) -> None:
+    ends_s = [float(track.times_s[-1]) for track in tracks if len(track.times_s)]
+    if onset_s is not None and ends_s and onset_s >= max(ends_s):
+        raise MtmError(
+            f"the recording ends at {max(ends_s):g} s of its own time, before the onset of {onset_s:g} s; give --onset "
+            "in that time, or leave it out"
+        )
 
 
 def _named_slot(scheme: Scheme, onset_s: float, at: RecordedAt) -> Start:

@@ -2,7 +2,7 @@
 
 from mtm_audit.detectors.base import Detector
 from mtm_audit.detectors.matched.profile import PlantProfile
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import MtmError, WrongValueError
 
 DETECTORS = ("coherency", "matched")
 
@@ -10,7 +10,7 @@ DETECTORS = ("coherency", "matched")
 def make_detector(name: str, profile: PlantProfile | None = None) -> Detector:
     """The detector of that name; raises MtmError when there is none, or none that takes a plant's profile."""
     if name not in DETECTORS:
-        raise MtmError(f"there is no detector {name!r}; choose one of: {', '.join(DETECTORS)}")
+        raise WrongValueError(f"there is no detector {name!r}; choose one of: {', '.join(DETECTORS)}")
     # Each needs much that the other does not.
     if name == "matched":
         from mtm_audit.detectors.matched.detector import MatchedDetector

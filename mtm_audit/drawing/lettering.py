@@ -46,6 +46,22 @@ def put_text(image: Image, text: str, corner: tuple[int, int], size_px: int, col
     image[rows, columns] = (under + cover * (np.asarray(colour, np.float32) - under) + 0.5).astype(np.uint8)
 
 
+def wrapped(lines: Sequence[str], size_px: int, width_px: int) -> list[str]:
+    """The lines cut between words so that each fits into a panel of that width; a word that does not stays whole."""
+    room_px = width_px - 2 * (size_px // 3)
+    fitting: list[str] = []
+    for line in lines:
+        own = ""
+        for word in line.split(" "):
+            longer = f"{own} {word}" if own else word
+            if own and text_size(longer, size_px)[0] > room_px:
+                fitting.append(own)
+                longer = word
+            own = longer
+        fitting.append(own)
+    return fitting
+
+
 def panel_size(lines: Sequence[str], size_px: int) -> tuple[int, int]:
     """Width and height in pixels of a panel of those lines."""
     sizes = [text_size(line, size_px) for line in lines]

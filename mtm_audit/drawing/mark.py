@@ -1,6 +1,6 @@
 """One thing that was seen in a picture, as it is drawn there."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -34,3 +34,9 @@ class Mark:
             return self.place
         seen = self.trail[np.isfinite(self.trail).all(axis=1)]
         return (float(seen[-1, 0]), float(seen[-1, 1])) if len(seen) else None
+
+    def scaled(self, factor: float) -> "Mark":
+        """The same mark in a picture that is `factor` times as large."""
+        place = None if self.place is None else (factor * self.place[0], factor * self.place[1])
+        outline = None if self.outline is None else factor * self.outline
+        return replace(self, place=place, outline=outline, trail=factor * self.trail)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from mtm_audit.drawing.lettering import line_px, panel_size, put_panel, text_px
+from mtm_audit.drawing.lettering import line_px, panel_size, put_panel, text_px, wrapped
 from mtm_audit.drawing.mark import Mark
 from mtm_audit.drawing.palette import HALO, WHITE, Bgr
 from mtm_audit.model.picture import Image
@@ -13,6 +13,8 @@ from mtm_audit.model.track import Floats
 
 _SHIFT = 4  # fractional bits of places, so that lines do not tremble from pixel to pixel
 _POINT_SHARE, _LEAST_REACH_PX = 0.012, 7.0  # of the picture's height: half a cross where no outline is known
+_RINGS = 4  # label heights from its mark that a label may be away
+_LEAST_LEAD_PX = 6.0
 _FARTHEST_PX = 1 << 14  # beyond any picture; places farther out would overflow
 
 # Left, upper, right and lower edge in pixels.
@@ -33,9 +35,7 @@ def draw(image: Image, marks: Sequence[Mark], caption: Sequence[str] = ()) -> Im
         _draw_trail(picture, mark)
     for mark in marks:
         _draw_shape(picture, mark)
-    taken = [_body_box(mark, picture.shape[0]) for mark in marks if mark.last_place is not None]
-    for mark in marks:
-        taken.append(_draw_label(picture, mark, taken))
+    _draw_labels(picture, marks)
     return _with_caption(picture, caption) if caption else picture
 
 
@@ -78,43 +78,83 @@ def _draw_shape(image: Image, mark: Mark) -> None:
 
 def _with_caption(image: Image, lines: Sequence[str]) -> Image:
     size = text_px(image.shape[0])
+    lines = wrapped(lines, size, image.shape[1])
     strip = np.zeros((panel_size(lines, size)[1], *image.shape[1:]), np.uint8)
     put_panel(strip, lines, (0, 0), size, [WHITE] * len(lines))
     return np.concatenate([image, strip])
 
 
-def _draw_label(image: Image, mark: Mark, taken: Sequence[_Box]) -> _Box:
-    """Write name and notes beside the mark, or at the left edge when it was never seen; returns the label's box."""
-    lines = (mark.name, *mark.notes)
-    size = text_px(image.shape[0])
-    width, height = panel_size(lines, size)
-    bar = 0 if mark.passed is None else max(size // 3, 3)
-    left, top = _room(mark, (width, height + bar), image, taken)
-    put_panel(image, lines, (left, top), size, [mark.colour, *[WHITE] * len(mark.notes)])
+def _draw_labels(image: Image, marks: Sequence[Mark]) -> None:
+    """Write name and notes beside each mark, or at the left edge for one that was never seen."""
+    taken = [_body_box(mark, image.shape[0]) for mark in marks if mark.last_place is not None]
+    boxes = []
+    for mark in marks:
+        boxes.append(_room(mark, _label_size(mark, image.shape[0]), image, taken))
+        taken.append(boxes[-1])
+    for mark, box in zip(marks, boxes, strict=True):
+        _lead(image, mark, box)
+    for mark, box in zip(marks, boxes, strict=True):
+        _draw_label(image, mark, box)
+
+
+def _label_size(mark: Mark, height_px: int) -> tuple[int, int]:
+    width, height = panel_size((mark.name, *mark.notes), text_px(height_px))
+    return width, height + _bar_px(mark, height_px)
+
+
+def _bar_px(mark: Mark, height_px: int) -> int:
+    return 0 if mark.passed is None else max(text_px(height_px) // 3, 3)
+
+
+def _draw_label(image: Image, mark: Mark, box: _Box) -> None:
+    left, top, right, bottom = box
+    colours = [mark.colour, *[WHITE] * len(mark.notes)]
+    put_panel(image, (mark.name, *mark.notes), (left, top), text_px(image.shape[0]), colours)
     if mark.passed is not None:
-        passed = left + round(min(max(mark.passed, 0.0), 1.0) * (width - 1))
-        rows = top + height, top + height + bar - 1
-        cv2.rectangle(image, (left, rows[0]), (left + width - 1, rows[1]), HALO, cv2.FILLED)
-        cv2.rectangle(image, (left, rows[0]), (passed, rows[1]), mark.colour, cv2.FILLED)
-    return left, top, left + width, top + height + bar
+        passed = left + round(min(max(mark.passed, 0.0), 1.0) * (right - left - 1))
+        upper = bottom - _bar_px(mark, image.shape[0])
+        cv2.rectangle(image, (left, upper), (right - 1, bottom - 1), HALO, cv2.FILLED)
+        cv2.rectangle(image, (left, upper), (passed, bottom - 1), mark.colour, cv2.FILLED)
 
 
-def _room(mark: Mark, size: tuple[int, int], image: Image, taken: Sequence[_Box]) -> tuple[int, int]:
-    """Where a label goes: the first place around its mark that hides nothing, or else the one that hides least."""
+def _room(mark: Mark, size: tuple[int, int], image: Image, taken: Sequence[_Box]) -> _Box:
+    """Where a label goes: the nearest place around its mark that hides nothing, or else the one that hides least."""
     width, height = size
     most = max(image.shape[1] - width, 0), max(image.shape[0] - height, 0)
     if mark.last_place is None:
         boxes = [(0, row) for row in range(0, most[1] + 1, max(height // 2, 1))]
     else:
-        left, top, right, bottom = _body_box(mark, image.shape[0])
-        middle = (left + right - width) // 2, (top + bottom - height) // 2
-        boxes = [
-            (middle[0], top - height), (middle[0], bottom), (right, middle[1]), (left - width, middle[1]),
-            (right, top - height), (left - width, top - height), (right, bottom), (left - width, bottom),
-            (middle[0], top - 2 * height), (middle[0], bottom + height),
-        ]  # fmt: skip
+        around = _body_box(mark, image.shape[0])
+        boxes = [box for ring in range(_RINGS) for box in _beside(_grown(around, ring * height), size)]
     inside = [(min(max(left, 0), most[0]), min(max(top, 0), most[1])) for left, top in boxes]
-    return min(inside, key=lambda corner: _hidden((*corner, corner[0] + width, corner[1] + height), taken))
+    places = [(left, top, left + width, top + height) for left, top in inside]
+    return min(places, key=lambda place: _hidden(place, taken))
+
+
+def _beside(box: _Box, size: tuple[int, int]) -> list[tuple[int, int]]:
+    """Upper left corners of labels of a size that touch a box from outside, those above and below it first."""
+    (left, top, right, bottom), (width, height) = box, size
+    middle = (left + right - width) // 2, (top + bottom - height) // 2
+    return [
+        (middle[0], top - height), (middle[0], bottom), (right, middle[1]), (left - width, middle[1]),
+        (right, top - height), (left - width, top - height), (right, bottom), (left - width, bottom),
+    ]  # fmt: skip
+
+
+def _grown(box: _Box, margin: int) -> _Box:
+    return box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
+
+
+def _lead(image: Image, mark: Mark, box: _Box) -> None:
+    """Draw a line from a label to its mark where they do not touch."""
+    if mark.last_place is None:
+        return
+    body = np.array(_body_box(mark, image.shape[0]), dtype=float)
+    middle = np.array(mark.last_place)
+    start = np.clip(middle, box[:2], box[2:])
+    end = np.clip(start, body[:2], body[2:])
+    if np.linalg.norm(end - start) > _LEAST_LEAD_PX:
+        polyline(image, np.stack([start, end]), mark.colour, closed=False, thick=1)
 
 
 def _reach_px(height_px: int) -> float:

@@ -17,11 +17,30 @@ def films_of(paths: Sequence[Path]) -> list[tuple[Path, ...]]:
 
     Raises MtmError when a chapter in the middle of a film is missing, since nobody knows how long it was.
     """
+    films = chapters_of(paths)
+    for chapters in films:
+        check_whole(chapters)
+    return films
+
+
+def chapters_of(paths: Sequence[Path]) -> list[tuple[Path, ...]]:
+    """As `films_of`, and a chapter in the middle may be missing, for `check_whole` to say."""
     films: dict[object, list[tuple[int, Path]]] = {}
     for path in paths:
         film, chapter = _place(path)
         films.setdefault(film, []).append((chapter, path))
-    return [_joined(sorted(chapters)) for chapters in films.values()]
+    return [tuple(path for _, path in sorted(chapters)) for chapters in films.values()]
+
+
+def check_whole(chapters: Sequence[Path]) -> None:
+    """Raise MtmError when a chapter between those of one film is missing."""
+    numbered = [(_place(path)[1], path) for path in chapters]
+    for (before, path), (after, next_path) in pairwise(numbered):
+        if after != before + 1:
+            raise MtmError(
+                f"{path.name} and {next_path.name} are chapters {before} and {after} of one film, and what lies "
+                "between them is missing; add it, or decode the parts one by one"
+            )
 
 
 def _place(path: Path) -> tuple[object, int]:
@@ -32,13 +51,3 @@ def _place(path: Path) -> tuple[object, int]:
     if later is not None:
         return (path.parent, later["head"].upper(), later["film"], path.suffix.upper()), int(later["chapter"])
     return path, 0
-
-
-def _joined(chapters: list[tuple[int, Path]]) -> tuple[Path, ...]:
-    for (before, path), (after, next_path) in pairwise(chapters):
-        if after != before + 1:
-            raise MtmError(
-                f"{path.name} and {next_path.name} are chapters {before} and {after} of one film, and what lies "
-                "between them is missing; add it, or decode the parts one by one"
-            )
-    return tuple(path for _, path in chapters)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from mtm_audit.model.picture import Frame
+from mtm_audit.model.pictured import Pictured
 from mtm_audit.model.track import Track
 from mtm_audit.readers.logs.opening import opening_of
 from mtm_audit.readers.logs.registry import check_foreign, format_of, read_log
@@ -60,13 +61,14 @@ def tracked(
     reference: Sequence[str] = (),
     warn: Callable[[str], None] | None = None,
     progress: Callable[[int], None] | None = None,
+    keep: Callable[[Pictured], None] | None = None,
 ) -> list[Track]:
-    """The tracks in frames, the camera's own motion taken out; see `load_tracks`."""
+    """The tracks in frames, the camera's own motion taken out; `keep` receives them with it. See `load_tracks`."""
+    from mtm_audit.tracking.stabilise import stabilised_tracks, unstabilised_tracks
+
     chosen = tracker(tracker_name, warn)
     if tracker_name.partition(":")[0] in _NO_CAMERA:
         if reference:
             raise MtmError(f"the tracker {tracker_name} measures nothing against a reference; leave out --reference")
-        return chosen.track(frames, progress)
-    from mtm_audit.tracking.stabilise import stabilised_tracks
-
-    return stabilised_tracks(chosen, frames, reference, warn, progress)
+        return unstabilised_tracks(chosen, frames, progress, keep)
+    return stabilised_tracks(chosen, frames, reference, warn, progress, keep)

@@ -7,6 +7,7 @@ from mtm_audit.ingest.films import film_frames, is_picture
 from mtm_audit.ingest.load import tracked
 from mtm_audit.ingest.logs import read_logs
 from mtm_audit.ingest.source import sources_of
+from mtm_audit.model.pictured import Pictured
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.recording import Kind, Recording
 from mtm_audit.model.track import Track
@@ -47,15 +48,16 @@ def read_recording(
     the camera's own motion is taken out. Raises MtmError when a file cannot be used, or when two files are of one body.
     """
     warnings: list[str] = []
+    kept: list[Pictured] = []
     if kind == "video":
         frames = film_frames(files, tracker_named(tracker).pixels, warnings.append, frame_rate_hz)
-        tracks = tracked(frames, tracker, reference, warnings.append, progress)
+        tracks = tracked(frames, tracker, reference, warnings.append, progress, kept.append)
         at = _created_at(files, tracks)
     else:
         contents = read_logs(files, options or ReadOptions(), warnings.append)
         tracks, at = list(contents.tracks), contents.at
     _check_names(tracks)
-    return Recording(tuple(files), kind, tuple(tracks), tuple(warnings), at)
+    return Recording(tuple(files), kind, tuple(tracks), tuple(warnings), at, pictured=kept[0] if kept else None)
 
 
 def _check_names(tracks: Sequence[Track]) -> None:

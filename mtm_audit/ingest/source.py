@@ -1,5 +1,6 @@
 """Which recordings the named files and folders are, before anything of them is read."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from mtm_audit.ingest.logs import log_files
 from mtm_audit.model.recording import Kind
 from mtm_audit.readers.picture_folder import pictures_in
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.secret_file import holds_secret
 
 # Where `mtm-hil record` puts the motion capture.
 _MOTION_CAPTURE_FOLDER = "mocap"
@@ -42,6 +44,9 @@ def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
     folders = [path for path in paths if path.is_dir()]
     found = [source for folder in folders for source in _in_folder(folder)]
     files = [path for path in paths if not path.is_dir()]
+    for path in files:
+        if os.access(path, os.R_OK) and holds_secret(path):
+            raise MtmError(f"{path} is a key file and no recording; name it with --key, and name a recording")
     pictures = tuple(path for path in files if is_picture(path))
     others = [path for path in files if path not in pictures]
     videos = [path for path in others if is_video(path)]
@@ -52,6 +57,14 @@ def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
         found.append(Source(pictures, "video"))
     found += [Source((path,), "motion capture") for path in others if path not in videos]
     return _joined(found)
+
+
+def recordings_of(paths: Sequence[Path]) -> tuple[Source, ...]:
+    """The recordings behind `paths` where each path is one by itself, films and logs alike; a folder of films several.
+
+    Raises MtmError as `sources_of` does.
+    """
+    return tuple(source for path in paths for source in sources_of([path]))
 
 
 def _joined(found: Sequence[Source]) -> tuple[Source, ...]:

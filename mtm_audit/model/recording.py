@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from mtm_audit.model.compression import Compression
+from mtm_audit.model.pictured import Pictured
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.track import Track
 
@@ -19,7 +20,8 @@ class Recording:
 
     `at` is when the files say that they were recorded, None when they do not. `speed` is how many times as fast as the
     files say it is played here, which was given, or found among others when `speed_searched`. `compression` is that of
-    a film, where it was asked for.
+    a film, where it was asked for. `pictured` are the tracks of a film as its pictures show them, in the
+    file's time. `together` names all recordings that were read together with this one, in order.
     """
 
     paths: tuple[Path, ...]
@@ -30,6 +32,8 @@ class Recording:
     speed: float = 1.0
     speed_searched: bool = False
     compression: Compression | None = None
+    together: tuple[str, ...] = ()
+    pictured: Pictured | None = None
 
     def begun_at(self, begun: RecordedAt) -> RecordedAt:
         """When the recording's own clock stood at zero, if its first observation was made at `begun.unix_s`."""

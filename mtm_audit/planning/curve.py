@@ -51,6 +51,13 @@ class Curve:
         """Symbol accuracy at a window length at which the curve exists."""
         return float(self.accuracies[window_ticks])
 
+    def trials_at(self, window_ticks: int) -> int:
+        """The trials that its accuracy rests on there: those of the point, or the fewer of the two around it."""
+        if self.is_measured_at(window_ticks) or len(self.window_ticks) == 1:
+            return int(self.trials[np.searchsorted(self.window_ticks, window_ticks)])
+        left = int(np.searchsorted(self.window_ticks, window_ticks)) - 1
+        return int(self.trials[left : left + 2].min())
+
     @cached_property
     def log_accuracies(self) -> Floats:
         """Natural logarithms of `accuracies`, -inf where the curve does not exist or says zero."""

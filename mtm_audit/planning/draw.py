@@ -13,8 +13,8 @@ from mtm_audit.planning.family import Family, Strategy
 from mtm_audit.planning.plan import Problem
 from mtm_audit.planning.search import Found, families, frontier
 from mtm_audit.planning.table import AccuracyTable
+from mtm_audit.reporting.figure_file import save_figure
 from mtm_audit.reporting.plot import check_plot_path
-from mtm_onboard.protocol.atomicfile import replacing
 
 _COLOURS: dict[Strategy, str] = {"single": "#b42318", "same": "#3366cc", "split": "#1e7a3a"}
 _LABELS: dict[Strategy, str] = {"single": "single channel", "same": "same message", "split": "split message"}
@@ -53,8 +53,7 @@ def draw_plan(table: AccuracyTable, problem: Problem, found: Sequence[Found], ra
     axes.legend(loc="lower right", frameon=False)
     axes.grid(axis="y", color="#e4e7ec", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
+    save_figure(figure, path, "mtm-audit plan")
 
 
 def _best_within(every: Sequence[Family], longest: float) -> tuple[Floats, Floats]:

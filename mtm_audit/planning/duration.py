@@ -8,7 +8,7 @@ from mtm_audit.planning.curve import Curve
 from mtm_audit.planning.interval import message_interval
 from mtm_audit.planning.search import curves_of
 from mtm_audit.planning.table import AccuracyTable, members_of, pooled_name
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import MtmError, WrongValueError
 from mtm_onboard.protocol.framing import payload_bits
 from mtm_onboard.protocol.scheme import Scheme, count_bins
 
@@ -49,7 +49,7 @@ def required_duration(scheme: Scheme, table: AccuracyTable, bits: int, target_ac
     channels or alphabet, or when the longest windows of the table do not suffice.
     """
     if not 0.0 < target_accuracy < 1.0:
-        raise MtmError(f"the target accuracy is {target_accuracy:g}; choose one above 0 and below 1")
+        raise WrongValueError(f"the target accuracy is {target_accuracy:g}; choose one above 0 and below 1")
     holds = payload_bits(scheme) if scheme.framing is None else scheme.framing.payload_bits
     if not 1 <= bits <= holds:
         raise MtmError(f"a payload of {bits} bits does not fit: a message of this key carries 1 to {holds} bits")

@@ -6,7 +6,7 @@ from rich.table import Table
 
 from mtm_audit.planning.check import Checked
 from mtm_audit.planning.correction import coded
-from mtm_audit.planning.plan import Plan, Problem, fastest_of
+from mtm_audit.planning.plan import Plan, Problem, fastest_of, is_carried
 from mtm_audit.planning.search import EXACT_SYMBOLS, Found, families, most_accurate
 from mtm_audit.planning.table import AccuracyTable
 
@@ -24,7 +24,7 @@ def rich_table(found: Sequence[Found], problem: Problem, rate_hz: float) -> Tabl
             continue
         plan, seconds = one.plan, one.plan.message_ticks / rate_hz
         low, high = plan.interval
-        note = "" if one.meets_target else "below the target"
+        note = "" if one.meets_target else "below the target" if is_carried(plan, problem) else "too few trials"
         table.add_row(
             one.strategy, str(plan.alphabet_size), str(plan.symbols), str(plan.message_ticks), f"{seconds:.2f}",
             f"{problem.payload_bits / seconds:.3g}", f"{plan.accuracy:.3f}", f"{low:.3f}-{high:.3f}",
@@ -42,8 +42,9 @@ def allocation_text(plan: Plan) -> str:
 def headline(found: Sequence[Found], problem: Problem, rate_hz: float) -> str:
     """The fastest scheme in one line."""
     plan = fastest(found)
+    surely = " surely" if problem.sure else ""
     return (
-        f"fastest for {problem.payload_bits} bits at {problem.target_accuracy:g}: {plan.strategy}, "
+        f"fastest for {problem.payload_bits} bits at {problem.target_accuracy:g}{surely}: {plan.strategy}, "
         f"M = {plan.alphabet_size}, T = {plan.message_ticks} ({plan.message_ticks / rate_hz:.2f} s)"
     )
 
@@ -58,6 +59,12 @@ def remarks(table: AccuracyTable, problem: Problem, found: Sequence[Found]) -> I
     between = [one.strategy for one in found if one.plan is not None and not one.plan.is_measured]
     if between:
         yield f"{', '.join(between)}: windows lie between measured ones, so the accuracy is interpolated"
+    for one in found:
+        if one.plan is not None and one.meets_target and one.plan.interval[0] < problem.target_accuracy:
+            yield (
+                f"{one.strategy}: its interval begins at {one.plan.interval[0]:.3f}, below the target; --sure plans "
+                "so that it begins there, and more trials make it narrower"
+            )
     if any(one.plan is not None and not one.plan.exact for one in found):
         yield f"split: over {EXACT_SYMBOLS} symbols, so shared out by capacity; a faster split may exist"
     for alphabet_size in problem.alphabet_sizes or table.alphabet_sizes:

@@ -11,7 +11,7 @@ from mtm_audit.model.track import Floats
 from mtm_audit.planning.bycapacity import SplitByCapacity
 from mtm_audit.planning.curve import Curve, Integers, fit_curve
 from mtm_audit.planning.family import Family, Split, Strategy, Uniform
-from mtm_audit.planning.plan import Plan, Problem, fastest_of, symbols_needed
+from mtm_audit.planning.plan import Plan, Problem, fastest_of, is_carried, reaches, symbols_needed
 from mtm_audit.planning.table import AccuracyTable
 from mtm_onboard.protocol.errors import MtmError
 
@@ -99,19 +99,24 @@ def _found(strategy: Strategy, every: Sequence[Family], problem: Problem) -> Fou
     for family in every:
         # An equally long one may still be more accurate.
         limit = min((plan.message_ticks for plan in plans), default=math.inf)
-        length = _first_reaching(family, math.log(problem.target_accuracy) - _SLACK, limit)
-        if length is not None:
-            plans.append(_plan(family, length))
+        plan = _first_reaching(family, problem, limit)
+        if plan is not None:
+            plans.append(plan)
     if plans:
         return Found(strategy, fastest_of(plans), meets_target=True)
     return Found(strategy, most_accurate(every), meets_target=False)
 
 
-def _first_reaching(family: Family, log_target: float, limit: float) -> int | None:
+def _first_reaching(family: Family, problem: Problem, limit: float) -> Plan | None:
+    log_target = math.log(problem.target_accuracy) - _SLACK
     for lengths, logs in family.lengths():
-        reaching = np.flatnonzero((logs >= log_target) & (lengths <= limit))
-        if len(reaching):
-            return int(lengths[reaching[0]])
+        # The interval's lower end is never above the prediction, so that nothing else can reach the target.
+        for place in np.flatnonzero((logs >= log_target) & (lengths <= limit)):
+            plan = _plan(family, int(lengths[place]))
+            if not is_carried(plan, problem):
+                continue
+            if not problem.sure or reaches(plan, problem):
+                return plan
         if len(lengths) and lengths[-1] > limit:
             return None
     return None
@@ -130,6 +135,17 @@ def _impossible(plans: Sequence[Plan], problem: Problem) -> str:
     if not plans:
         return f"{text}, nor with any other; measure longer windows"
     best = max(plans, key=lambda plan: plan.accuracy)
+    if best.accuracy >= problem.target_accuracy and not is_carried(best, problem):
+        trials = math.ceil(best.symbols / (1.0 - problem.target_accuracy) - 1e-9)
+        return (
+            f"{text}: there are so few trials that one more error among them would miss the target; measure about "
+            f"{trials} or more of each window, or lower the target"
+        )
+    if problem.sure and best.accuracy >= problem.target_accuracy:
+        return (
+            f"{text} surely: the interval of the best begins at {best.interval[0]:.3g} (M = {best.alphabet_size}, "
+            f"T = {best.message_ticks}); measure more trials or longer windows, lower the target, or leave out --sure"
+        )
     return (
         f"{text}: the best has {best.accuracy:.3g} (M = {best.alphabet_size}, T = {best.message_ticks}); lower the "
         "target, shorten the payload, or measure longer windows"

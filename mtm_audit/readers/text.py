@@ -37,7 +37,7 @@ def encoding_of(start: bytes) -> str:
     # Numbers and separators have a zero in each pair of bytes.
     if odd and odd.count(0) == len(odd) and not even.count(0):
         return "utf-16-le"
-    if even and even.count(0) == len(even) and not odd.count(0):
+    if odd and even.count(0) == len(even) and not odd.count(0):
         return "utf-16-be"
     return "utf-8"
 

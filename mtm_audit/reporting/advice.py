@@ -86,7 +86,7 @@ def _of_the_uncertain(recording: Recording, decoding: Decoding) -> list[str]:
     if unseen:
         bodies = sorted({body for place in unseen for body in _bodies(decoding, place)})
         sentences.append(
-            f"not seen: {_places(unseen)}, which {_listed(bodies)} sends; record that robot too, or name its track "
+            f"not seen: {_places(unseen)}, the part of {_listed(bodies)}; record that robot too, or name its track "
             "with --assign"
         )
     if silent:
@@ -97,7 +97,7 @@ def _of_the_uncertain(recording: Recording, decoding: Decoding) -> list[str]:
         )
     if doubtful:
         bodies = sorted({body for place in doubtful for body in _bodies(decoding, place)})
-        what = f"{_places(doubtful)}, which {_listed(bodies)} sends"
+        what = f"{_places(doubtful)}, the part of {_listed(bodies)}"
         sentences.append(f"uncertain: {what}; {_longer(recording, decoding, doubtful)}")
     return sentences
 

@@ -9,7 +9,7 @@ _MARKER_M = 0.1
 # A marker must be this wide to be read at all.
 _READABLE_PX = 20.0
 _VELOCITIES = frozenset({"vx", "vy", "vz"})
-_NAMES = {"h264": "H.264", "hevc": "HEVC", "av1": "AV1", "libdav1d": "AV1", "vp9": "VP9", "mjpeg": "MJPEG"}
+CODEC_NAMES = {"h264": "H.264", "hevc": "HEVC", "av1": "AV1", "libdav1d": "AV1", "vp9": "VP9", "mjpeg": "MJPEG"}
 
 
 def film_limits(recording: Recording, scheme: Scheme) -> tuple[str, ...]:
@@ -19,8 +19,9 @@ def film_limits(recording: Recording, scheme: Scheme) -> tuple[str, ...]:
         return ()
     low_px, high_px = found.smallest_motion_px
     quantiser = "" if found.quantiser is None else f" (quantiser {found.quantiser:.0f})"
+    codec = CODEC_NAMES.get(found.codec, found.codec)
     carried = (
-        f"the film is {_NAMES.get(found.codec, found.codec)} at {found.bits_per_pixel:.2g} bits a pixel{quantiser}: "
+        f"the film is {codec} at {found.bits_per_pixel:.2g} bits a pixel{quantiser}: "
         f"motion of a sharp marker below {low_px:.2f} to {high_px:.2f} px is lost in it, and several times as much of "
         "small or soft things"
     )

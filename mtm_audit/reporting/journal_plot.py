@@ -1,5 +1,6 @@
 """A journal as a picture: base and sent commands over time, and how late the ticks were."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -7,22 +8,28 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from mtm_audit.reporting.figure_file import save_figure
 from mtm_audit.reporting.journal_summary import AXES
+from mtm_audit.reporting.panels.style import TEXT_COLOUR, plain
 from mtm_audit.reporting.plot import check_plot_path
-from mtm_onboard.protocol.atomicfile import replacing
-from mtm_onboard.protocol.journal_file import JournalRecord
+from mtm_audit.reporting.subject import dated, now
+from mtm_onboard.protocol.journal_file import JournalHeader, JournalRecord
 
 _UNITS = ("m/s", "m/s", "rad/s")
 # More than a picture has columns; of a longer run every k-th tick is drawn.
 _MOST_POINTS = 20_000
 
 
-def draw_journal(record: JournalRecord, path: Path) -> None:
-    """Draw into `path`, whole or not at all; raises MtmError when no picture can be written there."""
+def draw_journal(record: JournalRecord, journal: Path, path: Path) -> None:
+    """Draw what the file `journal` says into `path`, whole or not at all.
+
+    Raises MtmError when no picture can be written there.
+    """
     check_plot_path(path)
     figure = Figure(figsize=(11.0, 8.5), dpi=100, layout=ConstrainedLayoutEngine(w_pad=0.15, h_pad=0.1))
     FigureCanvasAgg(figure)
-    figure.suptitle(f"{record.header.robot}: what was commanded", fontsize=15, fontweight="bold")
+    figure.suptitle(f"{plain(record.header.robot)}: what was commanded", fontsize=15, fontweight="bold")
+    figure.supxlabel(plain(_subject(record.header, journal)), fontsize=9, color=TEXT_COLOUR)
     *commands, lateness = figure.subplots(4, 1)
     every = max(1, len(record.ticks) // _MOST_POINTS)
     times_s = record.ticks[::every] / record.header.rate_hz
@@ -44,5 +51,13 @@ def draw_journal(record: JournalRecord, path: Path) -> None:
     lateness.set(xscale="log", yscale="log", xlabel="lateness of a tick [ms]", ylabel="ticks")
     lateness.set_ylim(bottom=0.5)
     lateness.spines[["top", "right"]].set_visible(False)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
+    save_figure(figure, path, "mtm-audit journal")
+
+
+def _subject(header: JournalHeader, journal: Path) -> str:
+    """Journal, key and dates in one line."""
+    started = "in simulated time"
+    if header.start_unix_s is not None:
+        started = f"started {datetime.fromtimestamp(header.start_unix_s, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    key = f"key {header.key_id} (scheme {header.fingerprint})"
+    return " · ".join([f"journal {journal.name}", key, started, f"drawn {dated(now())}"])

@@ -51,6 +51,10 @@ def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, .
             "speed": recording.speed,
             "piece_s": None if decoding.piece is None else list(decoding.piece),
         },
+        "together": [
+            {"recording": name, "verdict": each.verdict, "evidence_bits": each.evidence.bits}
+            for name, each in zip(recording.together, decoding.together, strict=True)
+        ],
         "rests_on": list(basis.sentences),
         "late_s": late_s(decoding),
         "warnings": list(warnings),

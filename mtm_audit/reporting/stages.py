@@ -20,11 +20,6 @@ from mtm_audit.reporting.text import (
 from mtm_onboard.protocol.framing import payload_bits
 
 _TRY = {
-    "key": "make one with mtm-onboard keygen, or name the file that the robot was provisioned with",
-    "recording": "play the file in another program to see whether it is whole",
-    "tracks": "film the markers larger and sharper, or choose another --tracker; --assign pairs bodies with tracks",
-    "glimpse": "record longer, with the robot in sight",
-    "timing": "record at least one whole message, or give --onset when it is known when the message began",
     "symbols": "record longer or from closer; repeats of the message add up",
     "message": "give --onset when it is known, and check what the robot was told to send",
     "verdict": "check that the key is the robot's, that it was sending (its journal says), and record longer",
@@ -33,11 +28,15 @@ _TRY = {
 
 @dataclass(frozen=True)
 class Stage:
-    """What one stage found, in short lines; `failed` when the decode came no further than this."""
+    """What one stage found, in short lines; `failed` when the decode came no further than this.
+
+    `says_what_to_do` when the lines are a refusal, which says so itself.
+    """
 
     name: str
     lines: tuple[str, ...]
     failed: bool = False
+    says_what_to_do: bool = False
 
 
 def text_of_stages(stages: Sequence[Stage]) -> str:
@@ -47,7 +46,8 @@ def text_of_stages(stages: Sequence[Stage]) -> str:
         said = list(stage.lines)
         if stage.failed:
             said[0] = f"FAILED: {said[0]}"
-            said.append(f"try: {_TRY[stage.name]}")
+            if not stage.says_what_to_do:
+                said.append(f"try: {_TRY[stage.name]}")
         lines += [f"{stage.name if row == 0 else '':<11}{line}" for row, line in enumerate(said)]
     return "\n".join(lines) + "\n"
 
@@ -104,6 +104,10 @@ def _timing_line(channel: ChannelDecoding, decoding: Decoding) -> str:
     if reading is None:
         return f"{channel.channel.name}: not read"
     how = "given" if decoding.settings.onset_s is not None else "found"
+    if decoding.verdict == "absent":
+        # Without a message the likeliest start is that of chance.
+        given = f"{channel.onset_s:.3f} s is looked at, as given" if how == "given" else "no start was found"
+        return f"{channel.channel.name}: {given}"
     return (
         f"{channel.channel.name}: the message begins at {channel.onset_s:.3f} s ({how}), ticks at "
         f"{reading.timing.rate_hz:.2f} Hz"
@@ -116,11 +120,12 @@ def _detector_lines(decoding: Decoding) -> tuple[str, ...]:
         if channel.reading is not None:
             ranked = np.sort(channel.reading.scores, axis=1)
             windows = len(channel.reading.window_positions)
-            margin = float(np.mean(ranked[:, -1] - ranked[:, -2]))
-            lines.append(
-                f"{channel.channel.name}: {windows} windows, best score {float(ranked[:, -1].mean()):.3f}, "
-                f"{margin:.3f} ahead of the next"
-            )
+            line = f"{channel.channel.name}: {windows} windows"
+            if decoding.verdict != "absent":
+                # Without a message the best symbol is that of chance, and its lead would look like a message.
+                margin = float(np.mean(ranked[:, -1] - ranked[:, -2]))
+                line += f", best score {float(ranked[:, -1].mean()):.3f}, {margin:.3f} ahead of the next"
+            lines.append(line)
     lines.append(f"{decoding.settings.detector}: {evidence_sentence(decoding)}")
     lines += [line for line in [decoys_sentence(decoding)] if line]
     return tuple(lines)

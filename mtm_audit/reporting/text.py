@@ -122,6 +122,17 @@ def piece_sentence(decoding: Decoding) -> str | None:
     return f"Read in pieces, since the recording is long; this is what {begin_s:.0f} s to {end_s:.0f} s show."
 
 
+def together_sentence(recording: Recording, decoding: Decoding) -> str | None:
+    """What each of several recordings says by itself; None for a single one."""
+    if not decoding.together:
+        return None
+    said = ", ".join(
+        f"{name} {each.evidence.bits:.1f} bits"
+        for name, each in zip(recording.together, decoding.together, strict=True)
+    )
+    return f"Recordings read together, by themselves: {said}. The channels are those of {recording.paths[0]}."
+
+
 def rarity(probability: float) -> str:
     """A probability as "43 in 100", "1 in 2,500" or "1 in 3e14"."""
     if probability >= 0.01:
@@ -132,32 +143,43 @@ def rarity(probability: float) -> str:
     return f"1 in {odds:,.0f}" if odds < 1e7 else f"1 in {odds:.0e}".replace("e+", "e")
 
 
-def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str], basis: Basis) -> RenderableType:
+def rests_on(recording: Recording, decoding: Decoding, basis: Basis = _NO_BASIS) -> tuple[str, ...]:
+    """What the verdict rests on beside its evidence, a sentence each."""
+    said = (
+        *basis.sentences,
+        clock_sentence(decoding),
+        search_sentence(recording, decoding),
+        frame_sentence(decoding),
+        piece_sentence(decoding),
+        together_sentence(recording, decoding),
+    )
+    return tuple(sentence for sentence in said if sentence)
+
+
+def facts(recording: Recording, decoding: Decoding) -> tuple[tuple[str, str], ...]:
+    """Key, scheme, recording and evidence, each with its name."""
     scheme = decoding.scheme
+    found = (
+        ("key", decoding.key_id),
+        ("scheme", f"{scheme.name} (fingerprint {scheme.fingerprint})"),
+        ("recording", recording_line(recording)),
+        ("evidence", evidence_sentence(decoding)),
+        ("decoys", decoys_sentence(decoding)),
+        ("frame", _frame_line(decoding)),
+    )
+    return tuple((name, line) for name, line in found if line)
+
+
+def _report(recording: Recording, decoding: Decoding, warnings: Sequence[str], basis: Basis) -> RenderableType:
+    said = frame_sentences(decoding, authenticates=basis.authenticates) + rests_on(recording, decoding, basis)
     parts: list[RenderableType] = [
         Text(verdict_sentence(decoding), style=_COLOURS[decoding.verdict]),
         Text(chance_sentence(decoding)),
-        *(
-            Text(sentence)
-            for sentence in (
-                *frame_sentences(decoding, authenticates=basis.authenticates),
-                *basis.sentences,
-                clock_sentence(decoding),
-                search_sentence(recording, decoding),
-                frame_sentence(decoding),
-                piece_sentence(decoding),
-            )
-            if sentence
-        ),
+        *map(Text, said),
         Text(""),
-        Text(f"key        {decoding.key_id}"),
-        Text(f"scheme     {scheme.name} (fingerprint {scheme.fingerprint})"),
-        Text(f"recording  {recording_line(recording)}"),
-        Text(f"evidence   {evidence_sentence(decoding)}"),
-        *(Text(f"decoys     {line}") for line in [decoys_sentence(decoding)] if line),
-        *(Text(line) for line in [_frame_line(decoding)] if line),
+        *(Text(f"{name:<11}{line}") for name, line in facts(recording, decoding)),
         Text(""),
-        _table_of(decoding),
+        table_of(decoding),
     ]
     parts += [Text(f"warning: {warning}", style="yellow") for warning in warnings]
     return Group(*parts)
@@ -173,7 +195,8 @@ def recording_line(recording: Recording) -> str:
     return f"{recording.kind}, {recording.duration_s:.1f} s, {recording.frames} {what}{rate}{speed}, tracks: {names}"
 
 
-def _table_of(decoding: Decoding) -> Table:
+def table_of(decoding: Decoding) -> Table:
+    """The channels with what was read; without a message without symbols."""
     if decoding.verdict == "absent":
         return _absent_table(decoding)
     return _symbol_table(decoding) if decoding.scheme.framing is None else _frame_table(decoding)
@@ -199,7 +222,7 @@ def _frame_line(decoding: Decoding) -> str | None:
     if not decoding.frames:
         return None
     count, unseen = len(decoding.symbols), sum(symbol is None for symbol in decoding.symbols)
-    return f"frame      {count - len(decoding.uncertain)} of {count} symbols are sure, {unseen} were not seen"
+    return f"{count - len(decoding.uncertain)} of {count} symbols are sure, {unseen} were not seen"
 
 
 def _symbol_table(decoding: Decoding) -> Table:

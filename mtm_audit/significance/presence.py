@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from mtm_audit.model.track import Floats
-from mtm_audit.significance.sequence import continued, sequence
+from mtm_audit.significance.sequence import continued, sequences
 from mtm_audit.significance.weighed_channel import (
     WeighedChannel,
     alike,
@@ -21,17 +21,24 @@ from mtm_audit.significance.weighed_channel import (
 
 
 def channel_nats(parts: Sequence[WeighedChannel]) -> float:
-    """Log e-value of any message on one channel, which is read in `parts`, the one that shows most first.
+    """Log e-value of any message on one channel, which is read in `parts`.
 
-    Any message in one of the parts, or the likeliest one in all of them, position by position; all equally probable.
+    Any message in one of the parts, or one of the likeliest in all of them, position by position; all equally probable.
     """
-    first, *others = parts
     found = [part.nats for part in parts]
-    if len(first.channel.shown) > 1 or others:
-        message = sequence(first)
+    if len(parts[0].channel.shown) > 1 or len(parts) > 1:
+        orders = [(part, [*parts[:row], *parts[row + 1 :]]) for row, part in enumerate(parts)]
+        found.append(float(logsumexp([_in_order(*order) for order in orders]) - np.log(len(orders))))
+    return float(logsumexp(found) - np.log(len(found)))
+
+
+def _in_order(first: WeighedChannel, others: Sequence[WeighedChannel]) -> float:
+    """Log e-value of any message in all parts, one after the other; those that are likeliest are looked at."""
+    found = []
+    for message in sequences(first):
         after = [continued(message, part.channel, part.channel.at(first.channel.timing)) for part in others]
         found.append(message.nats + sum(after))
-    return float(logsumexp(found) - np.log(len(found)))
+    return float(logsumexp(found))
 
 
 def presence(channels: Sequence[Sequence[WeighedChannel]], nats: Sequence[float]) -> float:

@@ -38,14 +38,19 @@ def likeliest(table: Floats, log_weights: Floats) -> Integers:
     return np.asarray(np.argmax(logsumexp(table + log_weights[:, None, None], axis=0), axis=1))
 
 
-def sequence(item: WeighedChannel) -> Sequence:
-    """The likeliest message of a channel by itself."""
+def sequences(item: WeighedChannel) -> list[Sequence]:
+    """The messages that are likeliest, by this channel alone and by all that was read together: different ones."""
     channel = item.channel
     chosen, log_priors = item.chosen
-    columns = likeliest(item.exact, log_priors + channel.mixed(item.by_group).sum(axis=-1))
-    told = _told(channel, item.terms, chosen, item.by_group, columns)
-    total = or_silent(told - np.log(channel.alphabet_size)).sum(axis=1) + log_priors
-    return Sequence(columns, float(logsumexp(total)) + item.cost, _log_timings(item.terms, chosen, total))
+    alone = likeliest(item.exact, log_priors + channel.mixed(item.by_group).sum(axis=-1))
+    # Candidates stand in the order of what all parts of a channel say together.
+    messages = [alone] if not alone.any() else [alone, np.zeros_like(alone)]
+    found = []
+    for columns in messages:
+        told = _told(channel, item.terms, chosen, item.by_group, columns)
+        total = or_silent(told - np.log(channel.alphabet_size)).sum(axis=1) + log_priors
+        found.append(Sequence(columns, float(logsumexp(total)) + item.cost, _log_timings(item.terms, chosen, total)))
+    return found
 
 
 def continued(first: Sequence, channel: ChannelTerms, terms: Terms) -> float:

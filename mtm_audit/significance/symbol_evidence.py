@@ -23,7 +23,7 @@ from mtm_audit.significance.weighed_channel import TableOf, WeighedChannel, alik
 Integers = NDArray[np.int64]
 
 # Of a symbol's weights so much come from the others, the rest from the prior.
-_OTHERS = 0.9
+OTHERS = 0.9
 # How many candidates of a position are weighed exactly.
 _TRIED = 2
 
@@ -59,7 +59,7 @@ def _symbol_nats(own: Sequence[WeighedChannel], showing: Sequence[int], position
     if any(value is None for value in others):
         return by_prior
     by_others = sum(value for value in others if value is not None)
-    return float(np.logaddexp(by_others + np.log(_OTHERS), by_prior + np.log(1.0 - _OTHERS)))
+    return float(np.logaddexp(by_others + np.log(OTHERS), by_prior + np.log(1.0 - OTHERS)))
 
 
 def _together(own: Sequence[WeighedChannel], showing: Sequence[int], position: int, symbol: int) -> float:
@@ -157,9 +157,27 @@ def _learned(channel: ChannelTerms, linear: Floats, quadratic: Floats, table: Fl
 
     `table` (hypotheses, shown positions, k) log e-values, weights of the hypotheses included.
     """
+    targets = _targets(channel, place)
+    tones = channel.tones[targets, place[1]][:, None]
+    linear, quadratic = learned_weights(channel, linear, quadratic, table, place)
+    return np.asarray(log_e_of(linear, quadratic, tones, channel.law)[..., 0].sum(axis=1))
+
+
+def _targets(channel: ChannelTerms, place: tuple[int, int]) -> Integers:
+    """The groups that carry the position in that row."""
+    return np.flatnonzero(np.searchsorted(np.array(channel.shown), channel.positions) == place[0])
+
+
+def learned_weights(
+    channel: ChannelTerms, linear: Floats, quadratic: Floats, table: Floats, place: tuple[int, int]
+) -> tuple[Floats, Floats]:
+    """Weights (hypotheses, the position's groups, axes, 2 K) once the other positions have shown each tone.
+
+    `place` and `table` as in `_learned`.
+    """
     columns = likeliest(table, np.zeros(len(table)))
     rows = np.searchsorted(np.array(channel.shown), channel.positions)
-    targets = np.flatnonzero(rows == place[0])
+    targets = _targets(channel, place)
     symbols = channel.candidates[np.arange(len(columns)), columns]
     # Where the candidate itself is the likeliest elsewhere, its waveform would have a say.
     apart = rows != place[0]
@@ -167,6 +185,4 @@ def _learned(channel: ChannelTerms, linear: Floats, quadratic: Floats, table: Fl
         apart &= symbols[rows] != channel.candidates[place]
     used = np.broadcast_to(apart, (len(targets), len(rows)))
     sent = channel.tones[np.arange(len(rows)), columns[rows]]
-    linear, quadratic = adapted(seen_of(linear, quadratic), sent, used, targets)
-    tones = channel.tones[targets, place[1]][:, None]
-    return np.asarray(log_e_of(linear, quadratic, tones, channel.law)[..., 0].sum(axis=1))
+    return adapted(seen_of(linear, quadratic), sent, used, targets)

@@ -44,6 +44,11 @@ class ArucoTracker:
         self._mirrored, self._dictionary, self._warn = mirrored, dictionary, warn or (lambda sentence: None)
         self.flipped = bool(mirrored)
 
+    @property
+    def dictionary(self) -> str:
+        """The name of the dictionary whose markers it follows."""
+        return self._dictionary
+
     def track(self, frames: Iterable[Frame], progress: Progress | None = None) -> list[Track]:
         """Track every marker in gray `frames`: one track per marker, `marker<id>`, in pixels with y up, with headings.
 

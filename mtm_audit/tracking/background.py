@@ -62,6 +62,8 @@ class BackgroundFollower:
     size: tuple[int, int] = (0, 0)
     _motion: Floats = field(default_factory=lambda: np.eye(3))
     _coarse: Image | None = None
+    # Of the last motion, for as long as the camera stays.
+    _few: "_Patches | None" = None
     _moved_s: float = -np.inf
     _looked_s: float = -np.inf
 
@@ -85,6 +87,7 @@ class BackgroundFollower:
             self._looked_s = frame.time_s
             self.looks.append(replace(self.looks[-1], row=len(self.times_s) - 1))
             return
+        self._few = None
         image = frame.image if frame.image.ndim == 2 else cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY)
         image = np.asarray(image, dtype=np.uint8)
         coarse = _coarse(image)
@@ -120,9 +123,11 @@ class BackgroundFollower:
 
     def _is_where_it_was(self, image: Image) -> bool:
         """Whether a few points lie where they were when the camera last moved."""
-        some = Key(0, self.keys[-1].image, self.keys[-1].points[:: len(self.keys[-1].points) // FEW or 1], np.eye(3))
-        places = _places(some, image, self._motion)
-        off_px = np.linalg.norm(places - cv2.perspectiveTransform(some.points[None], self._motion)[0], axis=1)
+        if self._few is None:
+            key = self.keys[-1]
+            self._few = _patches(replace(key, points=key.points[:: len(key.points) // FEW or 1]), image, self._motion)
+        places = self._few.found(image)
+        off_px = np.linalg.norm(places - self._few.expected, axis=1)
         off_px = off_px[np.isfinite(off_px)]
         return len(off_px) >= FEW // 2 and float(np.median(off_px)) < STILL_PX
 
@@ -138,7 +143,7 @@ class BackgroundFollower:
     def _find(self, image: Image, coarse: Image, time_s: float) -> None:
         key = self.keys[-1]
         expected = self._coarse_step(coarse) @ self._motion
-        places = _places(key, image, expected)
+        places = _patches(key, image, expected).found(image)
         found = np.isfinite(places[:, 0])
         motion = homography(key.points[found], places[found]) if found.sum() >= LEAST_POINTS else None
         if motion is None:
@@ -214,30 +219,49 @@ def _good_points(image: Image) -> Floats:
     return np.array(points, dtype=np.float64).reshape(-1, 2)
 
 
-def _places(key: Key, image: Image, expected: Floats) -> NDArray[np.float32]:
-    """Where the key's points are near to where `expected` (3, 3) puts them, (n, 2); NaN where not found."""
-    places = np.full(key.points.shape, np.nan, np.float32)
-    guesses = cv2.perspectiveTransform(key.points[None], expected)[0]
-    corners = np.rint(guesses).astype(np.int32) - PATCH_PX // 2
-    inside = np.flatnonzero(np.all((corners >= 0) & (corners + PATCH_PX <= np.array(image.shape[::-1])), axis=1))
-    if not len(inside):
+@dataclass(frozen=True)
+class _Patches:
+    """What a key's points look like at `expected` (n, 2), where a motion of the camera puts them.
+
+    All patches lie below one another in the picture `before`, so that one call finds them all; of those that are
+    `inside` the picture (their numbers), `corners` are where they begin in it.
+    """
+
+    expected: NDArray[np.float64]
+    inside: NDArray[np.intp]
+    corners: NDArray[np.int32]
+    before: Image
+
+    def found(self, image: Image) -> NDArray[np.float32]:
+        """Where the points are in a picture, (n, 2); NaN where not found near to where they are expected."""
+        places = np.full(self.expected.shape, np.nan, np.float32)
+        if not len(self.inside):
+            return places
+        left, upper = self.corners.T
+        now = np.lib.stride_tricks.sliding_window_view(image, (PATCH_PX, PATCH_PX))[upper, left].reshape(-1, PATCH_PX)
+        shifts = np.stack([-left, PATCH_PX * np.arange(len(self.inside)) - upper], axis=1)
+        start = (self.expected[self.inside] + shifts).astype(np.float32)
+        found, status, _ = cv2.calcOpticalFlowPyrLK(
+            self.before, now, start, start.copy(), winSize=(WINDOW_PX, WINDOW_PX), maxLevel=LEVELS
+        )
+        good = (status.ravel() == 1) & (np.abs(found - start).max(axis=1) < PATCH_PX / 4)
+        places[self.inside[good]] = (found - shifts)[good]
         return places
-    # All patches below one another in one picture, so that one call finds them all.
+
+
+def _patches(key: Key, image: Image, motion: Floats) -> _Patches:
+    """The patches around the key's points as `motion` (3, 3) turns and scales them in pictures of that size."""
+    expected = cv2.perspectiveTransform(key.points[None], motion)[0]
+    corners = np.rint(expected).astype(np.int32) - PATCH_PX // 2
+    inside = np.flatnonzero(np.all((corners >= 0) & (corners + PATCH_PX <= np.array(image.shape[::-1])), axis=1))
     corners = corners[inside]
-    patches = np.lib.stride_tricks.sliding_window_view(image, (PATCH_PX, PATCH_PX))[corners[:, 1], corners[:, 0]]
+    if not len(inside):
+        return _Patches(expected, inside, corners, np.empty((0, PATCH_PX), np.uint8))
     grid = np.stack(np.meshgrid(np.arange(PATCH_PX), np.arange(PATCH_PX)), axis=-1)
     own = (corners[:, None, None] + grid).astype(np.float32).reshape(-1, PATCH_PX, 2)
-    maps = cv2.perspectiveTransform(own, np.linalg.inv(expected))
+    maps = cv2.perspectiveTransform(own, np.linalg.inv(motion))
     before = cv2.remap(key.image, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    now = patches.reshape(-1, PATCH_PX)
-    shifts = np.stack([-corners[:, 0], PATCH_PX * np.arange(len(inside)) - corners[:, 1]], axis=1)
-    start = (guesses[inside] + shifts).astype(np.float32)
-    found, status, _ = cv2.calcOpticalFlowPyrLK(
-        before, now, start, start.copy(), winSize=(WINDOW_PX, WINDOW_PX), maxLevel=LEVELS
-    )
-    good = (status.ravel() == 1) & (np.abs(found - start).max(axis=1) < PATCH_PX / 4)
-    places[inside[good]] = (found - shifts)[good]
-    return places
+    return _Patches(expected, inside, corners, np.asarray(before, dtype=np.uint8))
 
 
 def _share_inside(points: Floats, motion: Floats, size: tuple[int, int]) -> float:

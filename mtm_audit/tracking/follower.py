@@ -14,7 +14,8 @@ from mtm_audit.tracking.markers import MarkerFinder, Sighting
 
 READ_EVERY_S = 0.25  # after which a marker's number is read again
 SURPRISE_SIDES = 0.08  # how far a corner may be from where it is expected, in sides, without being read
-FULL_SEARCH_EVERY_S = 0.75  # after which the whole picture is searched for markers that are new
+SEARCH_EVERY_S = 0.75  # after which the whole picture is searched for markers that are new
+FULL_SEARCH_EVERY = 3  # of those searches; the others are quick
 SEEN_AT_LEAST = 3  # frames; what is read less often is a chance reading of something else
 # For a marker out of sight the whole picture is searched in every frame at first, and then each time that it has been
 # so for a fifth longer.
@@ -62,6 +63,7 @@ class MarkerFollower:
         self._followed: dict[Copy, _Followed] = {}
         self._places: dict[Copy, list[Floats]] = {}
         self._searched_s = self._last_s = -np.inf
+        self._quick_searches = 0
         # Sightings by number of markers that cannot be read in a mirror, and of all markers.
         self.decisive: Counter[int] = Counter()
         self.sightings = 0
@@ -74,9 +76,13 @@ class MarkerFollower:
         continued = self._continued(image, frame.time_s)
         read = self._nearby(image, frame.time_s, except_for=continued)
         found = continued | read
-        if self._is_search_due(found, frame.time_s):
+        is_lost = self._is_lost_one_due(found, frame.time_s)
+        if is_lost or frame.time_s - self._searched_s >= SEARCH_EVERY_S:
             self._searched_s = frame.time_s
-            self._add_new(self._finder.everywhere(image), found, frame.time_s)
+            is_full = is_lost or self._quick_searches + 1 >= FULL_SEARCH_EVERY
+            self._quick_searches = 0 if is_full else self._quick_searches + 1
+            search = self._finder.everywhere if is_full else self._finder.quickly
+            self._add_new(search(image), found, frame.time_s)
         rough = [copy for copy in found if copy not in continued]
         fine = continued | dict(zip(rough, self._finder.refined(image, [found[copy] for copy in rough]), strict=True))
         for copy, sighting in fine.items():
@@ -139,9 +145,10 @@ class MarkerFollower:
                     found[copy] = sighting
         return found
 
-    def _is_search_due(self, found: dict[Copy, Sighting], time_s: float) -> bool:
+    def _is_lost_one_due(self, found: dict[Copy, Sighting], time_s: float) -> bool:
+        """Whether to search for a marker that is out of sight, or for the first one."""
         since_s = time_s - self._searched_s
-        if not self._followed or since_s >= FULL_SEARCH_EVERY_S:
+        if not self._followed:
             return True
         lost = [last for copy, last in self._followed.items() if copy not in found]
         for last in lost:

@@ -39,15 +39,16 @@ class FootballTracker:
     def __init__(self, colours: tuple[str, ...] = TEAM_COLOURS) -> None:
         self._names = {colour: f"agent{number}" for number, colour in enumerate(colours)}
         self._tracker = ColourTracker(colours, FULL_SEARCH_EVERY, LEAST_SHARE)
+        self.with_jumps: list[Track] = []
 
     def track(self, frames: Iterable[Frame], progress: Progress | None = None) -> list[Track]:
         """Track in `frames` of blue, green and red, in pixels with y up.
 
         Raises MtmError when none of the colours is found or the picture changes its size.
         """
-        found = self._tracker.track(frames, progress)
-        tracks = [without_jumps(replace(track, name=self._names[track.name])) for track in found]
-        return sorted(tracks, key=lambda track: list(self._names.values()).index(track.name))
+        found = {self._names[track.name]: track for track in self._tracker.track(frames, progress)}
+        self.with_jumps = [replace(found[name], name=name) for name in self._names.values() if name in found]
+        return [without_jumps(track) for track in self.with_jumps]
 
 
 def without_jumps(track: Track) -> Track:

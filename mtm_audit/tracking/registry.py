@@ -1,6 +1,6 @@
 """Trackers by name."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol
 
 from mtm_audit.model.picture import Frame, Pixels
@@ -72,3 +72,9 @@ def tracker(name: str, warn: Callable[[str], None] | None = None) -> Tracker:
 def is_flipped(tracker: Tracker) -> bool:
     """Whether the tracks that it made are those of the mirrored pictures."""
     return bool(getattr(tracker, "flipped", False))
+
+
+def in_picture(tracker: Tracker, tracks: Sequence[Track]) -> Sequence[Track]:
+    """The tracks that it made where the pictures show them, if it took jumps out of them."""
+    with_jumps: Sequence[Track] = getattr(tracker, "with_jumps", tracks)
+    return with_jumps

@@ -5,13 +5,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 
 from mtm_audit.model.picture import Frame
+from mtm_audit.model.pictured import Pictured
 from mtm_audit.model.track import Track
 from mtm_audit.tracking.background import BackgroundFollower
 from mtm_audit.tracking.background_path import background_path
 from mtm_audit.tracking.camera_path import CameraPath
 from mtm_audit.tracking.gather import Progress
 from mtm_audit.tracking.reference import FOR_HOMOGRAPHY, chosen_tracks, reference_path, still_tracks
-from mtm_audit.tracking.registry import Tracker, is_flipped
+from mtm_audit.tracking.registry import Tracker, in_picture, is_flipped
 
 # What stands still for the background may move by so much of the camera's motion, or so many pixels.
 AGREEING, AGREEING_PX = 0.1, 0.3
@@ -24,8 +25,11 @@ def stabilised_tracks(
     reference: Sequence[str] = (),
     warn: Callable[[str], None] | None = None,
     progress: Progress | None = None,
+    keep: Callable[[Pictured], None] | None = None,
 ) -> list[Track]:
     """The tracker's tracks as a camera that stood still would have shown them; `warn` hears what was taken out.
+
+    `keep` receives them as the pictures show them.
 
     `reference` names tracks that stand still. Without any, those that keep their distances are the reference when
     there are enough of them, and otherwise what is behind the robots. The motion of a camera that moved by no more
@@ -33,6 +37,8 @@ def stabilised_tracks(
     """
     seen = BackgroundFollower(is_needed=not reference)
     tracks = tracker.track(_looked_at(frames, seen), progress)
+    if keep is not None:
+        keep(Pictured(tuple(tracks), seen.size, is_flipped(tracker)))
     return without_camera(tracks, seen, reference, is_flipped(tracker), warn)
 
 
@@ -55,6 +61,20 @@ def without_camera(
     if warn is not None:
         warn(f"the camera moved by {path.motion_px(tracks):.2g} px rms; that was taken out by {path.source}")
     return [path.applied(track) for track in tracks]
+
+
+def unstabilised_tracks(
+    tracker: Tracker,
+    frames: Iterable[Frame],
+    progress: Progress | None = None,
+    keep: Callable[[Pictured], None] | None = None,
+) -> list[Track]:
+    """The tracker's tracks as they are; `keep` receives them where the pictures show them."""
+    seen = BackgroundFollower(is_needed=False)
+    tracks = tracker.track(_looked_at(frames, seen), progress)
+    if keep is not None:
+        keep(Pictured(tuple(in_picture(tracker, tracks)), seen.size, is_flipped(tracker)))
+    return tracks
 
 
 def _path(

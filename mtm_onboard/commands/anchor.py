@@ -10,7 +10,9 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     """Add the command and its options."""
     parser = subparsers.add_parser("anchor", help="write what verifies disclosed days; it is public")
     add_master(parser)
-    parser.add_argument("--out", required=True, type=Path, help="the anchor to write; it must not exist")
+    parser.add_argument(
+        "--out", required=True, type=Path, metavar="FILE", help="the anchor to write; it must not exist"
+    )
     parser.set_defaults(handler=_anchor)
 
 

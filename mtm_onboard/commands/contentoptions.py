@@ -13,8 +13,8 @@ def add_content(parser: argparse.ArgumentParser) -> "argparse._MutuallyExclusive
     """Add the options, exactly one of which must be given, and return their group."""
     group = parser.add_mutually_exclusive_group(required=True)
     group.add_argument("--message", type=int, metavar="N", help="the message as a number")
-    group.add_argument("--text", metavar="T", help="the message as text, for keys whose payload is text")
-    group.add_argument("--hex", metavar="H", help="the message as bytes, for keys whose payload is bytes")
+    group.add_argument("--text", metavar="TEXT", help="the message as text, for keys whose payload is text")
+    group.add_argument("--hex", metavar="HEX", help="the message as bytes, for keys whose payload is bytes")
     group.add_argument(
         "--symbols", type=_symbols, metavar="S,S,...", help="the whole message as symbols, for keys without framing"
     )
@@ -28,9 +28,11 @@ def content_table(args: argparse.Namespace) -> dict[str, Any]:
 
 def content(args: argparse.Namespace) -> "Content":
     """What was given; raises MtmError when it is malformed."""
+    from mtm_onboard.protocol.errors import command_line_values
     from mtm_onboard.runtime.message import content_from_table
 
-    return content_from_table(content_table(args))
+    with command_line_values():
+        return content_from_table(content_table(args))
 
 
 def _symbols(text: str) -> tuple[int, ...]:

@@ -7,7 +7,9 @@ from pathlib import Path
 def add_robot(parser: argparse.ArgumentParser) -> None:
     """Add the options, one of which must be given."""
     group = parser.add_mutually_exclusive_group(required=True)
-    group.add_argument("--config", type=Path, help="the robot's configuration (TOML), which names its control socket")
+    group.add_argument(
+        "--config", type=Path, metavar="FILE", help="the robot's configuration (TOML), which names its control socket"
+    )
     group.add_argument("--socket", type=Path, metavar="PATH", help="the robot's control socket itself")
 
 

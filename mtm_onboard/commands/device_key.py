@@ -7,7 +7,7 @@ from pathlib import Path
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command and its options."""
     parser = subparsers.add_parser("device-key", help="make a key with which images for one device are sealed")
-    parser.add_argument("--out", required=True, type=Path, help="the file to write; it must not exist")
+    parser.add_argument("--out", required=True, type=Path, metavar="FILE", help="the file to write; it must not exist")
     parser.set_defaults(handler=_device_key)
 
 

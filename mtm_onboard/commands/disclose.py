@@ -12,7 +12,7 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser = subparsers.add_parser("disclose", help="give out the key of a day that is over, for everybody to verify")
     add_master(parser)
     parser.add_argument("--day", required=True, type=day, metavar="DAY", help="the day, in UTC, such as 2026-01-31")
-    parser.add_argument("--out", required=True, type=Path, help="the file to write; it must not exist")
+    parser.add_argument("--out", required=True, type=Path, metavar="FILE", help="the file to write; it must not exist")
     parser.add_argument(
         "--allow-unsynchronised",
         action="store_true",

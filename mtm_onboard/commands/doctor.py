@@ -9,11 +9,11 @@ _SHORTEST_S, _LONGEST_S = 1.0, 3600.0
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command and its options."""
     parser = subparsers.add_parser("doctor", help="look for what would keep a robot from running well; moves nothing")
-    parser.add_argument("--config", required=True, type=Path, help="the robot's configuration (TOML)")
-    parser.add_argument("--key", required=True, type=Path, help="the key file")
+    parser.add_argument("--config", required=True, type=Path, metavar="FILE", help="the robot's configuration (TOML)")
+    parser.add_argument("--key", required=True, type=Path, metavar="FILE", help="the key file")
     parser.add_argument("--json", action="store_true", help="print the findings as JSON, see docs/doctor.md")
     parser.add_argument(
-        "--seconds", type=_seconds, default=10.0, metavar="S", help="how long the loop is watched (%(default)g)"
+        "--seconds", type=_seconds, default=10.0, metavar="SECONDS", help="how long the loop is watched (%(default)g)"
     )
     parser.set_defaults(handler=_doctor)
 

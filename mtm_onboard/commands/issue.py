@@ -28,7 +28,9 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--not-after", type=instant, metavar="TIME",
         help="when the file expires, such as 2026-01-31T12:00:00Z (with its last day)",
     )  # fmt: skip
-    parser.add_argument("--out", required=True, type=Path, help="the key file to write; it must not exist")
+    parser.add_argument(
+        "--out", required=True, type=Path, metavar="FILE", help="the key file to write; it must not exist"
+    )
     parser.set_defaults(handler=_issue)
 
 
@@ -60,7 +62,9 @@ def _issue(args: argparse.Namespace) -> int:
 
 def add_master(parser: argparse.ArgumentParser) -> None:
     """Add the option that names the master."""
-    parser.add_argument("--master", required=True, type=Path, help="the master's file, which mtm-onboard keygen made")
+    parser.add_argument(
+        "--master", required=True, type=Path, metavar="FILE", help="the master's file, which mtm-onboard keygen made"
+    )
 
 
 def load_master(path: Path) -> "tuple[Key, MasterHolding]":

@@ -51,11 +51,13 @@ _FRAMING = ("payload", "number_bits", "check", "code", "interleave")
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command and its options."""
     parser = subparsers.add_parser("keygen", help="make a key file: a secret and the scheme it is for")
-    parser.add_argument("--id", required=True, help="the key's name, which journals and auditors show")
-    parser.add_argument("--out", required=True, type=Path, help="the key file to write; it must not exist")
+    parser.add_argument("--id", required=True, metavar="NAME", help="the key's name, which journals and auditors show")
+    parser.add_argument(
+        "--out", required=True, type=Path, metavar="FILE", help="the key file to write; it must not exist"
+    )
     parser.add_argument("--preset", choices=sorted(_PRESETS), help="a whole scheme; the options below override parts")
     parser.add_argument("--scheme", type=Path, metavar="FILE", help="a scheme file, as mtm-audit plan writes it")
-    parser.add_argument("--name", help="the scheme's name")
+    parser.add_argument("--name", metavar="NAME", help="the scheme's name")
     parser.add_argument("--rate", type=float, metavar="HZ", help="control rate")
     parser.add_argument("--band", type=_band, metavar="LOW:HIGH", help="noise band in Hz, such as 0.5:5")
     parser.add_argument("--alphabet", type=int, metavar="M", help="number of different symbols")
@@ -64,10 +66,24 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--channel", action="append", metavar="NAME:AXES:SYMBOLS:SIGMA[:BODY]",
         help="a channel, such as robot0:vx,vy:1:0.1, once for each; the body is named like the channel unless given",
     )  # fmt: skip
-    parser.add_argument("--combine", help="split (default): each channel carries its part; same: all carry all")
-    parser.add_argument("--pooling", help="how auditors pool channels that carry the same: mean (default) or majority")
-    parser.add_argument("--power", help="window (default): each window has mean square 1; ensemble: Gaussian samples")
-    parser.add_argument("--schedule", help="rolling (default): no waveform is played twice; fixed: they come again")
+    parser.add_argument(
+        "--combine", metavar="split|same", help="split (default): each channel carries its part; same: all carry all"
+    )
+    parser.add_argument(
+        "--pooling",
+        metavar="mean|majority",
+        help="how auditors pool channels that carry the same: mean (default) or majority",
+    )
+    parser.add_argument(
+        "--power",
+        metavar="window|ensemble",
+        help="window (default): each window has mean square 1; ensemble: Gaussian samples",
+    )
+    parser.add_argument(
+        "--schedule",
+        metavar="rolling|fixed",
+        help="rolling (default): no waveform is played twice; fixed: they come again",
+    )
     parser.add_argument("--epoch", type=int, metavar="N", help="number of the first epoch (0)")
     add_days(parser, _USUAL_DAYS)
     _add_framing(parser)
@@ -86,18 +102,24 @@ def _add_framing(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--check", type=_sized, metavar="KIND:BITS", help="crc:BITS or tag:BITS, such as tag:32, or none"
     )
-    group.add_argument("--code", help="none (default), or reed-solomon: whatever is left free becomes parity")
+    group.add_argument(
+        "--code",
+        metavar="none|reed-solomon",
+        help="none (default), or reed-solomon: whatever is left free becomes parity",
+    )
     group.add_argument("--interleave", action="store_true", default=None, help="deal symbols over channels and time")
 
 
 def _keygen(args: argparse.Namespace) -> int:
     from mtm_onboard.protocol import generate_key, save_key
+    from mtm_onboard.protocol.errors import command_line_values
     from mtm_onboard.protocol.key import generate_master
     from mtm_onboard.protocol.schemefile import load_scheme
 
     given = {name: getattr(args, name) for name in (*_REQUIRED, *_CHOSEN_BY_SCHEME, *_FRAMING)}
     if args.scheme is None:
-        scheme = _chosen_scheme(args, given)
+        with command_line_values():
+            scheme = _chosen_scheme(args, given)
     elif args.preset is not None or any(value is not None for value in given.values()):
         args.usage_error("--scheme gives the whole scheme; leave out --preset and the options for its parts")
     else:

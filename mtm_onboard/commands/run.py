@@ -10,17 +10,17 @@ from mtm_onboard.commands.contentoptions import add_content, content
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command and its options."""
     parser = subparsers.add_parser("run", help="drive the robot: base commands in, base commands and message out")
-    parser.add_argument("--config", required=True, type=Path, help="the robot's configuration (TOML)")
-    parser.add_argument("--key", required=True, type=Path, help="the key file")
+    parser.add_argument("--config", required=True, type=Path, metavar="FILE", help="the robot's configuration (TOML)")
+    parser.add_argument("--key", required=True, type=Path, metavar="FILE", help="the key file")
     add_content(parser).add_argument(
         "--no-message", action="store_true", help="no noise until mtm-onboard send gives a message"
     )
     parser.add_argument("--no-repeat", action="store_true", help="send the message once, then base commands alone")
     parser.add_argument(
-        "--duration", type=_seconds, default=math.inf, metavar="S", help="end this long after the message's start"
+        "--duration", type=_seconds, default=math.inf, metavar="SECONDS", help="end this long after the message's start"
     )
     parser.add_argument(
-        "--start-at", type=_seconds, metavar="T",
+        "--start-at", type=_seconds, metavar="SECONDS",
         help="the message's start in seconds since the Unix epoch, still to come and the same for robots that start "
         "together (now); under the rolling schedule the first slot from then on",
     )  # fmt: skip

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command and its options."""
     parser = subparsers.add_parser("show", help="print a key's scheme and fingerprint, not its secret")
-    parser.add_argument("--key", required=True, type=Path, help="the key file")
+    parser.add_argument("--key", required=True, type=Path, metavar="FILE", help="the key file")
     parser.set_defaults(handler=_show)
 
 

@@ -12,7 +12,12 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     add_robot(parser)
     parser.add_argument("--json", action="store_true", help="print JSON, with --watch one line each time")
     parser.add_argument(
-        "--watch", type=_seconds, nargs="?", const=1.0, metavar="S", help="a line every S seconds (1) until Ctrl-C"
+        "--watch",
+        type=_seconds,
+        nargs="?",
+        const=1.0,
+        metavar="SECONDS",
+        help="a line every so many seconds (1) until Ctrl-C",
     )
     parser.set_defaults(handler=_status)
 

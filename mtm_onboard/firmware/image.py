@@ -28,7 +28,8 @@ TAG_BYTES = 16
 MAX_MESSAGES = 4096
 MAX_Q20 = 1 << 30
 
-_MAGIC = b"MTMI"
+# How the file begins.
+IMAGE_MAGIC = b"MTMI"
 _HEADER = struct.Struct("<4sHBBIIIIQQ8s6I16s")
 _CRC = struct.Struct("<I")
 _STEP_ONE = 1 << 36
@@ -113,7 +114,7 @@ def image_bytes(image: Image) -> bytes:
     records = (number for pair in zip(image.steps, image.limits_q20, strict=True) for number in pair)
     size = _HEADER.size + image.samples.size * 2 + _CRC.size
     header = _HEADER.pack(
-        _MAGIC, VERSION, axes, image.repeats, size, image.rate_mhz, image.message_ticks, image.messages,
+        IMAGE_MAGIC, VERSION, axes, image.repeats, size, image.rate_mhz, image.message_ticks, image.messages,
         image.first_message, image.epoch, bytes.fromhex(image.fingerprint), *records, image.tag,
     )  # fmt: skip
     content = header + image.samples.astype("<i2").tobytes()
@@ -122,7 +123,7 @@ def image_bytes(image: Image) -> bytes:
 
 def parse_image(data: bytes) -> Image:
     """The image in `data`; raises MtmError when it is cut off, altered, of another version or not an image."""
-    if len(data) < _HEADER.size + _CRC.size or data[: len(_MAGIC)] != _MAGIC:
+    if len(data) < _HEADER.size + _CRC.size or data[: len(IMAGE_MAGIC)] != IMAGE_MAGIC:
         raise MtmError("this is not an image, or only its beginning; export it again")
     fields = _HEADER.unpack_from(data)
     _, version, axes, flags, size, rate_mhz, message_ticks, messages, first_message, epoch, fingerprint = fields[:11]

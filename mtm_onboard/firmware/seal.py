@@ -12,7 +12,8 @@ from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.keystream import SECRET_BYTES
 
 VERSION = 1
-_MAGIC = b"MTMS"
+# How a sealed image begins.
+SEAL_MAGIC = b"MTMS"
 _HEADER = struct.Struct("<4sHHIII3I")
 _TAG_BYTES = 16
 _LABEL = b"\x04seal"
@@ -42,14 +43,14 @@ def sealed(image: Image, seal: Seal, device_key: bytes) -> bytes:
     """The image behind its seal, as the device takes it; raises MtmError for a key of another length."""
     content = image_bytes(image)
     size = _HEADER.size + _TAG_BYTES + len(content)
-    header = _HEADER.pack(_MAGIC, VERSION, 0, size, seal.channel, seal.counter, *seal.noise_limits_q20)
+    header = _HEADER.pack(SEAL_MAGIC, VERSION, 0, size, seal.channel, seal.counter, *seal.noise_limits_q20)
     return header + _tag(header, content, device_key) + content
 
 
 def parse_sealed(data: bytes, device_key: bytes) -> tuple[Seal, Image]:
     """Seal and image; raises MtmError when the seal is not one of the device's key or the image is none."""
     begin = _HEADER.size + _TAG_BYTES
-    if len(data) < begin or data[: len(_MAGIC)] != _MAGIC:
+    if len(data) < begin or data[: len(SEAL_MAGIC)] != SEAL_MAGIC:
         raise MtmError("this is no sealed image, or only its beginning; export it again")
     _, version, nothing, size, channel, counter, *limits = _HEADER.unpack_from(data)
     if version != VERSION:

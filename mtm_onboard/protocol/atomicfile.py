@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.secret_file import holds_secret
 
 
 @contextmanager
@@ -14,11 +15,15 @@ def replacing(path: Path, *, mode: int = 0o644) -> Iterator[Path]:
     """Yield a temporary path beside `path`, with its suffix; it takes the place of `path` when the block succeeds.
 
     An exception or an interrupt inside the block removes the temporary file and leaves whatever `path` held.
-    Raises MtmError when the folder does not exist or cannot be written, or when `path` is a folder.
+    Whose file it replaces is the caller's to ask (see `output_file`), but it never replaces a key file. Raises MtmError
+    for one, when the folder does not exist or cannot be written, and when `path` is a folder.
     """
+    _spare_secret(path)
     with _temporary(path, mode) as temporary:
         yield temporary
         _confirm(temporary)
+        # Again, since the work in the block may have taken hours.
+        _spare_secret(path)
         _take_place(temporary, path)
 
 
@@ -59,6 +64,11 @@ def write_new(path: Path, text: str, *, mode: int) -> None:
                 f"cannot write {path}: {error.strerror}; choose a folder of a disk that has links"
             ) from error
         temporary.unlink()
+
+
+def _spare_secret(path: Path) -> None:
+    if holds_secret(path):
+        raise MtmError(f"{path} is a key file, and no command replaces one; choose another name")
 
 
 def _exists(path: Path) -> MtmError:

@@ -10,7 +10,7 @@ from typing import Any
 
 from mtm_onboard.protocol.atomicfile import write_new
 from mtm_onboard.protocol.codebook import Codebook
-from mtm_onboard.protocol.errors import MtmError
+from mtm_onboard.protocol.errors import MtmError, WrongValueError
 from mtm_onboard.protocol.holding import Holding, Secret, holding_of
 from mtm_onboard.protocol.holding_file import MOST_DAYS, holding_from_table, holding_text
 from mtm_onboard.protocol.input_file import LARGEST_TEXT_BYTES, BrokenTextError, decoded, opened, parsed_toml
@@ -18,6 +18,7 @@ from mtm_onboard.protocol.keystream import SECRET_BYTES
 from mtm_onboard.protocol.master import USUAL_DAYS, new_master
 from mtm_onboard.protocol.scheme import Scheme, scheme_from_table
 from mtm_onboard.protocol.schemefile import scheme_text
+from mtm_onboard.protocol.secret_file import looks_like_key
 
 # Format 1 has one secret for everything, format 2 a part of the key tree.
 KEY_FORMATS = (1, 2)
@@ -75,13 +76,13 @@ def generate_master(key_id: str, scheme: Scheme, first_day: date, days: int) -> 
     if scheme.schedule != "rolling":
         raise MtmError('keys of format 2 have a day\'s key for each day; make the schedule "rolling"')
     if not 1 <= days <= MOST_DAYS:
-        raise MtmError(f"a key is for 1 to {MOST_DAYS} days, not {days}; give fewer")
+        raise WrongValueError(f"a key is for 1 to {MOST_DAYS} days, not {days}; give fewer")
     return Key(key_id, new_master(key_id, scheme, first_day, days), scheme)
 
 
 def _check_id(key_id: object) -> None:
     if not isinstance(key_id, str) or not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", key_id):
-        raise MtmError(
+        raise WrongValueError(
             f"the key id {key_id!r} is not usable; take 1 to 64 letters, digits, dots, dashes or underscores"
         )
 
@@ -138,6 +139,10 @@ def _secret(text: Any, path: Path) -> bytes:
 def _read_private_toml(path: Path) -> dict[str, Any]:
     try:
         with opened(path, "the key file") as file:
+            # What is no key file need not be kept from others, so this comes first.
+            if not looks_like_key(file.read(LARGEST_TEXT_BYTES)):
+                raise MtmError(f"{path} is no key file; name the file that mtm-onboard keygen or issue wrote")
+            file.seek(0)
             mode = os.fstat(file.fileno()).st_mode
             if mode & 0o077:
                 raise MtmError(f"{path} can be read by others (mode {mode & 0o777:04o}); run: chmod 600 {path}")

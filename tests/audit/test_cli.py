@@ -1,3 +1,4 @@
+import hashlib
 import inspect
 import json
 import os
@@ -66,10 +67,10 @@ def audit(folder, capsys):
     return run
 
 
-def refused(answer, words):
-    """One sentence on standard error, nothing on standard output, exit code 1."""
-    code, out, err = answer
-    assert (code, out) == (1, "")
+def refused(answer, words, code=1):
+    """One sentence on standard error, nothing on standard output, and the exit code."""
+    assert answer[:2] == (code, "")
+    err = answer[2]
     assert err.startswith("mtm-audit: ")
     assert err.count("\n") == 1
     assert words in err
@@ -123,7 +124,7 @@ def test_a_missing_robot_is_named_with_what_would_help(audit, folder):
     code, out, _ = audit(folder / "sent/robot0.tum", *QUICK)
     assert code == 4
     assert out.startswith("inconclusive:")
-    assert "not seen: symbol 1, which robot1 sends" in out
+    assert "not seen: symbol 1, the part of robot1" in out
     assert "warning: no track shows robot1" in out
 
 
@@ -225,8 +226,8 @@ def test_a_decode_is_drawn(audit, folder, tmp_path, name, code):
 
 
 def test_an_unwritable_picture_is_refused_before_the_work(audit, folder, tmp_path, monkeypatch):
-    monkeypatch.setattr("mtm_audit.commands.decode.decode_tracks", lambda *_: pytest.fail("worked first"))
-    refused(audit(folder / "sent", "--plot", tmp_path / "decode.bmp"), "end the name in .png, .pdf, .svg")
+    monkeypatch.setattr("mtm_audit.decoding.recorded.decode_tracks", lambda *_: pytest.fail("worked first"))
+    refused(audit(folder / "sent", "--plot", tmp_path / "decode.bmp"), "end the name in .png, .pdf, .svg", code=2)
     refused(audit(folder / "sent", "--plot", tmp_path / "nowhere/decode.png"), "choose a folder that exists")
     (tmp_path / "folder.png").mkdir()
     refused(audit(folder / "sent", "--plot", tmp_path / "folder.png"), "is a folder")
@@ -237,18 +238,19 @@ def test_a_drawing_that_breaks_off_leaves_the_former_picture(audit, folder, tmp_
         raise KeyboardInterrupt
 
     picture = tmp_path / "decode.png"
-    picture.write_bytes(b"the former one")
+    picture.write_bytes(PNG + b"\x1a\nmade by mtm-audit decode: the former one")
+    former = picture.read_bytes()
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", interrupted)
     code, out, _ = audit(folder / "sent", *QUICK, "--plot", picture, "--json")
     assert (code, out) == (130, "")
-    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("decode.png", b"the former one")]
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("decode.png", former)]
 
 
 def test_an_interrupt_ends_with_130_and_no_answer(audit, folder, monkeypatch):
     def interrupted(*_args, **_kwargs):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("mtm_audit.commands.decode.decode_tracks", interrupted)
+    monkeypatch.setattr("mtm_audit.decoding.recorded.decode_tracks", interrupted)
     code, out, err = audit(folder / "sent", "--json")
     assert (code, out) == (130, "")
     assert "interrupted" in err
@@ -336,8 +338,8 @@ def test_a_truncated_video_is_refused(audit, video):
 
 
 def test_names_that_do_not_exist_are_refused_with_those_that_do(audit, folder):
-    refused(audit(folder / "sent", "--tracker", "eyes"), "choose one of: aruco")
-    refused(audit(folder / "sent", detector="guessing"), "choose one of: coherency")
+    refused(audit(folder / "sent", "--tracker", "eyes"), "choose one of: aruco", code=2)
+    refused(audit(folder / "sent", detector="guessing"), "choose one of: coherency", code=2)
     refused(audit(folder / "sent", "--assign", "arm=robot0"), "its bodies are: robot0, robot1")
 
 
@@ -448,7 +450,7 @@ def test_options_of_logs_reach_the_reader(audit, tmp_path):
     ],
 )
 def test_options_of_logs_that_mean_nothing_are_refused(audit, folder, option, value, words):
-    refused(audit(folder / "sent", option, value), words)
+    refused(audit(folder / "sent", option, value), words, code=2)
 
 
 def test_a_topic_is_chosen_on_the_command_line(audit, tmp_path):
@@ -466,3 +468,54 @@ def test_a_file_left_out_of_a_folder_is_told(audit, folder, tmp_path):
     assert ["prices.csv is of no format that is read" in warning for warning in json.loads(out)["warnings"]].count(
         True
     ) == 1
+
+
+@pytest.mark.parametrize(("name", "code"), [("sent", 0), ("silent", 3), ("sent/robot0.tum", 4)])
+def test_a_report_is_written_beside_the_answer(audit, folder, tmp_path, name, code):
+    page = tmp_path / "report.html"
+    found, out, _ = audit(folder / name, *QUICK, "--report", page, "--json")
+    text = page.read_text(encoding="utf-8")
+    assert (found, list(tmp_path.iterdir())) == (code, [page])
+    assert {0: "decoded: message 13", 3: "absent: no message", 4: "inconclusive: a message"}[code] in text
+    assert json.loads(out)["verdict"] in text
+    assert f"mtm-audit decode {folder / name} --onset 1 --decoys 30 --report {page} --json --key" in text
+    assert hashlib.sha256((folder / "robot.key").read_bytes()).hexdigest() in text
+    assert FAKE_SECRET.hex() not in text
+
+
+def test_a_report_replaces_reports_and_nothing_else(audit, folder, tmp_path):
+    page = tmp_path / "report.html"
+    page.write_text("<!DOCTYPE html><p>somebody's own page")
+    refused(audit(folder / "sent", *QUICK, "--report", page), "was not made by mtm-audit decode")
+    assert page.read_text() == "<!DOCTYPE html><p>somebody's own page"
+    assert audit(folder / "sent", *QUICK, "--report", page, "--force")[0] == 0
+    assert audit(folder / "silent", *QUICK, "--report", page)[0] == 3
+    assert "absent: no message" in page.read_text(encoding="utf-8")
+
+
+def test_a_report_never_takes_the_place_of_a_key(audit, folder, tmp_path):
+    key = tmp_path / "key.html"
+    shutil.copy(folder / "robot.key", key)
+    refused(audit(folder / "sent", *QUICK, "--report", key, "--force"), "is a key file")
+    assert key.read_bytes() == (folder / "robot.key").read_bytes()
+
+
+def test_a_report_is_refused_before_the_work(audit, folder, tmp_path, monkeypatch):
+    monkeypatch.setattr("mtm_audit.decoding.recorded.decode_tracks", lambda *_: pytest.fail("worked first"))
+    refused(audit(folder / "sent", "--report", tmp_path / "report.txt"), "end it in .html or .htm", code=2)
+    refused(audit(folder / "sent", "--report", tmp_path / "nowhere/report.html"), "there is no folder")
+    refused(audit(folder / "sent", "--report", tmp_path / "a.html", "--plot", tmp_path / "a.html"), "for two results")
+
+
+def test_a_track_with_markup_in_its_name_is_printed_whole(audit, folder, tmp_path):
+    for number in range(2):
+        shutil.copy(folder / f"sent/robot{number}.tum", tmp_path / f"body[left]{number}.tum")
+    _, out, _ = audit(tmp_path, *QUICK)
+    assert "robot0  body[left]0" in out
+
+
+def test_an_absent_message_s_explanation_names_no_best_symbol(audit, folder):
+    code, out, _ = audit(folder / "silent", *QUICK, "--explain")
+    assert code == 3
+    assert "ahead of the next" not in out
+    assert "the message begins" not in out

@@ -172,6 +172,7 @@ def test_several_films_are_decoded_one_after_the_other(audit, folder, tmp_path):
     assert out.count("decoded: message") == 2
     assert err.count("three.mp4 is not a video") == 1
     assert audit(tmp_path, "--plot", tmp_path / "plot.png")[0] == 1
+    assert audit(tmp_path, "--report", tmp_path / "report.html")[0] == 1
 
 
 def test_an_api_decode_takes_the_same_options(folder, slow):

@@ -15,6 +15,7 @@ from hil.experiments.detectors.paper_figures import MARGINS
 from hil.fleet.lockstep import run_lockstep
 from hil.fleet.programs import program
 from hil.sensors.cameras import CAMERAS
+from hil.worlds.robomaster import tagged_scheme
 from hil.worlds.vehicles import VEHICLES
 from mtm_audit.readers.logs.registry import read_log
 from mtm_audit.readers.video import read_frames
@@ -23,6 +24,14 @@ from mtm_onboard.protocol import load_key
 from tests.patience import PATIENCE_S, until
 
 QUICK = ["record", "--seconds", "2", "--wire", "direct"]
+
+
+@pytest.fixture(scope="module")
+def paper_key(tmp_path_factory):
+    """Of the fixed schedule, so that two recordings with one seed are equal, whenever they are made."""
+    path = tmp_path_factory.mktemp("key") / "paper.key"
+    assert onboard(["keygen", "--preset", "paper-robomaster-fleet", "--id", "fake", "--out", str(path)]) == 0
+    return path
 
 
 def run(*arguments):
@@ -37,12 +46,21 @@ def test_a_recording_has_motion_capture_the_truth_and_the_key(tmp_path, capsys):
     assert "keep it secret" in output
     assert "it takes --seconds 13.5 to record it once" in output
     truth = json.loads((tmp_path / "a" / "truth.json").read_text())
-    assert (truth["message"], truth["symbols"], truth["onset_s"]) == (178, [2, 3, 0, 2], 1.5)
+    assert (truth["message"], len(truth["symbols"]), truth["onset_s"]) == (178, 12, 1.5)
     key = load_key(tmp_path / "a" / "robot.key")
     assert truth["scheme_fingerprint"] == key.scheme.fingerprint
-    assert key.secret.hex() not in (tmp_path / "a" / "truth.json").read_text()
+    assert key.holding.grant.kind == "master"
+    assert key.scheme == tagged_scheme() == load_key(preset_key(tmp_path)).scheme
+    assert key.secret.master.hex() not in (tmp_path / "a" / "truth.json").read_text()
     assert len(read_log(tmp_path / "a" / "mocap" / "robot3.tum").tracks[0].times_s) == 201
     assert sorted(path.name for path in (tmp_path / "a").iterdir()) == ["mocap", "robot.key", "truth.json"]
+
+
+def preset_key(folder):
+    """What the key generator makes by default."""
+    path = folder / "preset.key"
+    assert onboard(["keygen", "--preset", "robomaster-fleet", "--id", "fake", "--out", str(path)]) == 0
+    return path
 
 
 @pytest.mark.parametrize("plant", [name for name in VEHICLES if name != "arm"])
@@ -57,7 +75,7 @@ def test_any_kind_of_robot_that_drives_can_be_recorded(plant, tmp_path, capsys):
 
 
 def test_an_arm_does_not_drive_through_the_arena(tmp_path, capfd):
-    assert run(*QUICK, "--no-message", "--plant", "arm", "--no-video", "--out", tmp_path / "a") == 1
+    assert run(*QUICK, "--no-message", "--plant", "arm", "--no-video", "--out", tmp_path / "a") == 2
     assert "the plant 'arm' does not drive through the fleet's arena; choose from: robomaster" in capfd.readouterr().err
     assert not (tmp_path / "a").exists()
 
@@ -101,10 +119,9 @@ def test_a_film_can_be_that_of_a_surveillance_camera(tmp_path):
     assert frames[-1].time_s == pytest.approx(2.0, abs=0.01)
 
 
-def test_two_recordings_of_one_seed_and_key_are_equal(tmp_path):
-    run(*QUICK, "--message", 1, "--no-video", "--out", tmp_path / "a")
+def test_two_recordings_of_one_seed_and_key_are_equal(tmp_path, paper_key):
     for name in ("b", "c"):
-        run(*QUICK, "--message", 7, "--no-video", "--key", tmp_path / "a" / "robot.key", "--out", tmp_path / name)
+        run(*QUICK, "--message", 7, "--no-video", "--key", paper_key, "--out", tmp_path / name)
     for path in ("truth.json", "mocap/robot1.tum"):
         assert (tmp_path / "b" / path).read_bytes() == (tmp_path / "c" / path).read_bytes()
 
@@ -138,7 +155,7 @@ def test_wrong_usage_ends_with_2(tmp_path, arguments):
     assert run("record", "--out", tmp_path / "a", *arguments) == 2
 
 
-def test_in_real_time_programs_get_key_file_and_folder(tmp_path, monkeypatch, capsys):
+def test_in_real_time_programs_get_key_file_and_folder(tmp_path, monkeypatch, capsys, paper_key):
     def as_if_in_real_time(settings, key_file, folder):
         assert load_key(key_file) == settings.key
         assert folder.is_dir()
@@ -146,7 +163,18 @@ def test_in_real_time_programs_get_key_file_and_folder(tmp_path, monkeypatch, ca
         return run_lockstep(settings)
 
     monkeypatch.setattr("hil.commands.record.run_realtime", as_if_in_real_time)
-    wanted = ["--seconds", "5", "--realtime", "--message", "1", "--no-video", "--out", tmp_path / "a"]
+    wanted = [
+        "--seconds",
+        "5",
+        "--realtime",
+        "--message",
+        "1",
+        "--no-video",
+        "--out",
+        tmp_path / "a",
+        "--key",
+        paper_key,
+    ]
     assert run("record", *wanted) == 0
     assert (tmp_path / "a" / "onboard").is_dir()
     assert json.loads((tmp_path / "a" / "truth.json").read_text())["onset_s"] == 4.0
@@ -215,7 +243,7 @@ def test_calibrating_writes_the_plant_and_prints_candidates(quick_rollouts, tmp_
     cells, plant = tmp_path / "cells.jsonl", tmp_path / "plant.toml"
     assert run("calibrate", "-n", 2, "--out", plant, "--cells", cells) == 0
     assert "slip_mps = 0.0425\n" in plant.read_text()
-    assert plant.read_text().startswith("# Written by: mtm-hil calibrate -n 2\n")
+    assert plant.read_text().startswith("# mtm-hil calibrate -n 2\n")
     output = capsys.readouterr().out
     assert output.count("(75)") == 6 * len(SLIPS_MPS)
     assert len(cells.read_text().splitlines()) == 2 * 6 * len(SLIPS_MPS)

@@ -102,6 +102,10 @@ def allowed_calls() -> set[str]:
     return allowed
 
 
+def ticks_kept(journal: Path) -> int:
+    return sum(line[:1].isdigit() for line in journal.read_text().splitlines()) if journal.exists() else 0
+
+
 def robot(link: str) -> SerialWire:
     plant = FloatingPlant()
     if link == "none":
@@ -126,10 +130,12 @@ def test_each_link_drives_with_the_calls_the_service_may_make(tmp_path, link):
     traced = ["strace", "-f", "-qq", "-o", "trace", sys.executable, "-c", WITHOUT_WRITABLE_CODE, *program]
     process = subprocess.Popen(traced, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     client = BaseCommandClient(tmp_path / "r.base")
-    moved, began_s = 0, time.monotonic()
-    while moved < 50 and process.poll() is None and time.monotonic() - began_s < PATIENCE_S:
+    journal, moved, enough, began_s = tmp_path / "r.csv", 0, False, time.monotonic()
+    while not enough and process.poll() is None and time.monotonic() - began_s < PATIENCE_S:
         moved += client.send(BodyVelocity(0.1, 0.0, 0.0)) and (link == "none" or wire.controller.demand != STOP)
         wire.poll(time.monotonic() - began_s)
+        # A traced program on a busy machine misses many of its ticks.
+        enough = moved >= 50 and ticks_kept(journal) >= 20
         time.sleep(0.01)
     program_id = int((tmp_path / "trace").read_text().split(maxsplit=1)[0])
     subprocess.run(["kill", f"-{signal.SIGTERM.value}", str(program_id)], check=True)
@@ -142,7 +148,7 @@ def test_each_link_drives_with_the_calls_the_service_may_make(tmp_path, link):
     assert process.returncode == 0, error
     assert "cannot refuse" not in error
     assert moved >= 50
-    assert len(read_journal(tmp_path / "r.csv").ticks) >= 20
+    assert len(read_journal(journal).ticks) >= 20
     made = set(re.findall(r"^\d+ +(?:<\.\.\. )?([a-z0-9_]+)", (tmp_path / "trace").read_text(), re.MULTILINE))
     assert {"sched_setscheduler", "execve", "mlockall"} <= made
     assert made - allowed_calls() == set()

@@ -25,9 +25,10 @@ LIBRARIES = {
     "logs": ["ezc3d", "mcap", "mcap_protobuf", "pymavlink", "pyulog", "rosbags"],
     "live": ["aiohttp"],
     "parquet": ["pyarrow"],
+    "cluster": ["distributed"],
     "worlds": ["vmas", "mujoco", "Box2D"],
 }
-COMPLETE = ("audit", "live", "logs", "parquet", "hil", "worlds")
+COMPLETE = ("audit", "live", "logs", "parquet", "cluster", "hil", "worlds")
 
 pytestmark = pytest.mark.long
 

@@ -20,7 +20,8 @@ from mtm_audit.model.glimpse import Glimpse
 from mtm_audit.model.timing import Timing
 from mtm_audit.model.track import Floats
 from mtm_audit.planning.table import pooled_name
-from mtm_onboard.protocol import Codebook, Key, MtmError, Scheme
+from mtm_onboard.protocol import Codebook, Key, Scheme
+from mtm_onboard.protocol.errors import WrongValueError
 from mtm_onboard.protocol.framing import channel_symbols
 from mtm_onboard.protocol.scheme import scheme_from_table
 from mtm_onboard.protocol.schemefile import scheme_text
@@ -36,7 +37,9 @@ _KEYS_STREAM, _SYMBOLS_STREAM = 3, 4
 def rollout_parameters(scheme: Scheme, detector: str, plant: MecanumParameters) -> dict[str, Scalar]:
     """Parameters of a cell for `read_rollout`; raises MtmError when there is no such detector."""
     if detector not in DETECTORS:
-        raise MtmError(f"there is no detector {detector!r} to measure with; choose one of: {', '.join(DETECTORS)}")
+        raise WrongValueError(
+            f"there is no detector {detector!r} to measure with; choose one of: {', '.join(DETECTORS)}"
+        )
     return {"scheme": scheme_text(scheme), "detector": detector, **asdict(plant)}
 
 

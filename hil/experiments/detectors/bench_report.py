@@ -12,7 +12,7 @@ from hil.experiments.detectors.bench import DETECTORS, PAPER_SIGMA, Row
 from hil.experiments.detectors.bench_rollout import COHERENCY, GENIE, MATCHED
 from hil.experiments.runs.proportion import Proportion
 from hil.experiments.runs.result_file import write_result_csv
-from mtm_onboard.protocol.atomicfile import replacing
+from mtm_audit.reporting.figure_file import save_figure
 
 _COLUMNS = ("alphabet_size", "window_ticks", "windows", "sigma", "detector", "rollouts")
 _COLOURS = {COHERENCY: "#b42318", MATCHED: "#3366cc", GENIE: "#475467"}
@@ -73,8 +73,7 @@ def draw_plot(path: Path, rows: Sequence[Row]) -> None:
     axes.legend(loc="lower right", frameon=False)
     axes.grid(axis="y", color="#e4e7ec", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
+    save_figure(figure, path, "mtm-hil bench")
 
 
 def _ordered(rows: Sequence[Row]) -> list[Row]:

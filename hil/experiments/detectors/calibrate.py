@@ -87,7 +87,7 @@ def best_candidate(candidates: Sequence[Candidate]) -> Candidate:
 def write_plant(path: Path, plant: MecanumParameters, candidate: Candidate, command: str) -> None:
     """Write the calibrated plant, with a header that says which command made it and what it attained."""
     lines = [
-        f"# Written by: {command}",
+        f"# {command}",
         "# slip_mps is fitted to the paper's RoboMaster margins; everything else is set by hand.",
         f"# Sum of squared log ratios of the margins to the paper's: {candidate.misfit:.4f}",
     ]

@@ -16,6 +16,7 @@ from mtm_onboard.protocol import MtmError
 
 Scalar = str | int | float | bool
 Values = Mapping[str, Scalar]
+_LINE_BEGINS = b'{"code": '
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,8 @@ class CellStore:
         self._path = path
         self._code = code_fingerprint() if code is None else code
         self._finished: dict[str, Values] = {}
+        if path.exists() and not path.is_file():
+            raise MtmError(f"{path} is a folder, pipe or device; name a file for finished cells")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("ab+", buffering=0)
@@ -69,17 +72,32 @@ class CellStore:
         os.fsync(self._file.fileno())
         self._finished[cell.name] = result
 
+    @classmethod
+    def check(cls, path: Path) -> None:
+        """Raise MtmError when what is at `path` is something else; meant for the time before the long work."""
+        if os.path.lexists(path):
+            with cls(path):
+                pass
+
     def _load(self) -> None:
         self._file.seek(0)
         text = self._file.read()
         whole = text[: text.rfind(b"\n") + 1]
-        if len(whole) < len(text):
-            self._file.truncate(len(whole))
         for number, line in enumerate(whole.splitlines(), 1):
             try:
                 entry = json.loads(line)
                 if entry["code"] == self._code:
                     self._finished[entry["cell"]] = entry["result"]
             except (ValueError, TypeError, KeyError) as error:
-                self._file.close()
-                raise MtmError(f"{self._path}, line {number}, is no finished cell; remove the file") from error
+                raise self._foreign(number) from error
+        # What follows the last whole line is cut off only where it is the beginning of another one: a file of something
+        # else, such as a key, stays as it is.
+        rest = text[len(whole) :]
+        if rest[: len(_LINE_BEGINS)] != _LINE_BEGINS[: len(rest)]:
+            raise self._foreign(whole.count(b"\n") + 1)
+        if rest:
+            self._file.truncate(len(whole))
+
+    def _foreign(self, number: int) -> MtmError:
+        self._file.close()
+        return MtmError(f"{self._path}, line {number}, is no finished cell; name another file for --cells")

@@ -14,6 +14,7 @@ from hil.worlds.registry import make_world
 from hil.worlds.schemes import SIGNALS, split_scheme
 from hil.worlds.world import Integers, World, check_axes
 from mtm_onboard.protocol import Codebook, MtmError, Scheme
+from mtm_onboard.protocol.errors import WrongValueError
 from mtm_onboard.protocol.framing import channel_symbols
 from mtm_onboard.protocol.scheme import scheme_from_table
 from mtm_onboard.protocol.schemefile import scheme_text
@@ -32,7 +33,9 @@ def world_parameters(world: str, scheme: Scheme, detector: str) -> dict[str, Sca
     Raises MtmError when there is no such detector, the simulator is missing, or the scheme is not for this world.
     """
     if detector not in DETECTORS:
-        raise MtmError(f"there is no detector {detector!r} to measure with; choose one of: {', '.join(DETECTORS)}")
+        raise WrongValueError(
+            f"there is no detector {detector!r} to measure with; choose one of: {', '.join(DETECTORS)}"
+        )
     made = make_world(world)
     check_axes(made, scheme)
     if scheme.rate_hz != made.rate_hz:

@@ -15,7 +15,8 @@ from hil.plants.mecanum import calibrated_parameters
 from hil.worlds.registry import NAMES
 from hil.worlds.robomaster import fleet_scheme
 from mtm_audit.planning.table import AccuracyPoint, AccuracyTable, members_of
-from mtm_onboard.protocol import MtmError, Scheme
+from mtm_onboard.protocol import Scheme
+from mtm_onboard.protocol.errors import WrongValueError
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class Sweep:
 def world_of(name: str) -> World:
     """The world of that name; raises MtmError that lists them."""
     if name not in WORLDS:
-        raise MtmError(f"there is no world {name!r}; choose one of: {', '.join(WORLDS)}")
+        raise WrongValueError(f"there is no world {name!r}; choose one of: {', '.join(WORLDS)}")
     return WORLDS[name]
 
 

@@ -15,7 +15,7 @@ from mtm_audit.detectors.matched.motion import Motion, uniform_motion
 from mtm_audit.detectors.matched.noise import principal_axes
 from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_audit.detectors.matched.refine import refined_timing
-from mtm_audit.detectors.matched.search import search_timings
+from mtm_audit.detectors.matched.search import SEARCHED_RATES, search_timings
 from mtm_audit.detectors.matched.windows import LEAST_PART, Window, make_windows
 from mtm_audit.model.glimpse import Glimpse
 from mtm_audit.model.timing import Onset, Timing
@@ -51,8 +51,13 @@ class MatchedDetector:
         """
         glimpses = [observation.glimpse for observation in observations]
         motions, refusals = _motions(glimpses, codebook)
-        prepared = _prepared(motions, glimpses)
         channels = {number: observations[number].channel for number in motions}
+        for number in list(motions):
+            # A search for windows far longer than the recording takes a memory of their length.
+            if _holds_no_part(codebook, channels[number], motions[number]):
+                refusals[number] = _less_than_a_part(codebook, channels[number], codebook.scheme.rate_hz)
+                del motions[number]
+        prepared = _prepared(motions, glimpses)
         alone = _searched([codebook, *decoys], channels, prepared, onset, progress)
         searched = _shared([codebook, *decoys], channels, prepared, alone, onset)
         for number in list(motions):
@@ -84,6 +89,8 @@ class MatchedDetector:
         for column, prepared in _prepared(motions, glimpses).items():
             for length in np.unique(ticks):
                 rows = np.flatnonzero(ticks == length)
+                if _holds_no_part(codebooks[0], channels[int(rows[0])], prepared.motion):
+                    continue
                 played = [(codebook, channels[int(row)]) for row in rows for codebook in codebooks]
                 found = search_timings(played, prepared, onset, usual_rates=usual_rates)
                 for place, item in enumerate(found):
@@ -224,13 +231,23 @@ def _numbers(codebook: Codebook, channel: Channel, motion: Motion, timing: Timin
     return range(first, last + 1)
 
 
+def _holds_no_part(codebook: Codebook, channel: Channel, motion: Motion) -> bool:
+    """Whether the whole motion is too short for a part of a window, however fast its clock runs."""
+    fastest_hz = codebook.scheme.rate_hz * (1.0 + SEARCHED_RATES)
+    return len(motion.seen) * motion.step_s < LEAST_PART * codebook.scheme.window_ticks(channel) / fastest_hz
+
+
 def _too_short(
     codebook: Codebook, channel: Channel, prepared: Prepared, timing: Timing, onset: Onset
 ) -> MtmError | None:
     """Why no window of the channel can be read from the motion; None when one can."""
     if len(_numbers(codebook, channel, prepared.motion, timing, onset)):
         return None
-    length_s = codebook.scheme.window_ticks(channel) / timing.rate_hz
+    return _less_than_a_part(codebook, channel, timing.rate_hz)
+
+
+def _less_than_a_part(codebook: Codebook, channel: Channel, rate_hz: float) -> MtmError:
+    length_s = codebook.scheme.window_ticks(channel) / rate_hz
     return MtmError(
         f"the recording holds less than a third of a window of {length_s:g} s of channel {channel.name!r} after the "
         "onset; record longer"

@@ -22,6 +22,7 @@ from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.atomicfile import replacing
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.input_file import BrokenTextError, parsed_toml, read_text
+from mtm_onboard.protocol.output_file import heading_of
 
 PROFILE_FORMAT = 2
 # The next robot of the type is another one, with another load on another floor.
@@ -61,10 +62,10 @@ def profile_text(profile: PlantProfile) -> str:
     return "\n".join([f"format = {PROFILE_FORMAT}", "plants = [", *rows, "]"]) + "\n"
 
 
-def save_profile(profile: PlantProfile, path: Path) -> None:
-    """Write the profile file, whole or not at all; raises MtmError when it cannot be written."""
+def save_profile(profile: PlantProfile, path: Path, command: str = "mtm-audit profile") -> None:
+    """Write the profile file with the mark of `command`, whole or not at all; raises MtmError when it cannot be."""
     with replacing(path) as temporary:
-        temporary.write_text(profile_text(profile), encoding="utf-8")
+        temporary.write_text(heading_of(command) + profile_text(profile), encoding="utf-8")
 
 
 def load_profile(path: Path) -> PlantProfile:

@@ -22,6 +22,7 @@ WHAT = "an ArduPilot DataFlash log"
 # Estimators of version 3 and 2, which count cores, and positions by latitude and longitude.
 _ESTIMATES, _GLOBAL = ("XKF1", "NKF1"), ("POS", "GPS")
 _FIX_3D = 3
+_HEAD_BYTES = 3
 
 
 def recognises_dataflash(opening: Opening) -> bool:
@@ -55,10 +56,12 @@ def read_dataflash(path: Path, options: ReadOptions, warn: Warn) -> Log:
 def _quiet(module: Any) -> Any:
     """The library's reader without its compiled index, which writes past Python to standard error.
 
-    It closes the file also where it cannot be indexed.
+    It closes the file also where it cannot be indexed, and takes no format of messages that is shorter than their head.
     """
 
     class Quiet(module.DFReader_binary):  # type: ignore[misc]
+        formats: dict[int, Any]
+
         def __init__(self, path: Path) -> None:
             try:
                 super().__init__(str(path), zero_time_base=False)
@@ -71,7 +74,20 @@ def _quiet(module: Any) -> Any:
         def init_arrays_fast(self, progress_callback: Any = None) -> None:
             self.init_arrays(progress_callback)
 
+        def init_arrays(self, progress_callback: Any = None) -> None:
+            self.formats = _Formats(self.formats)
+            super().init_arrays(progress_callback)
+
     return Quiet
+
+
+class _Formats(dict[int, Any]):
+    """Formats of messages by their numbers, each at least as long as the head that every message has."""
+
+    def __setitem__(self, number: int, form: Any) -> None:
+        if form.len < _HEAD_BYTES:
+            raise ValueError(f"messages {form.name} are said to have {form.len} bytes")
+        super().__setitem__(number, form)
 
 
 def _rows(log: Any) -> dict[str, list[Any]]:

@@ -21,6 +21,14 @@ def check_topics(path: Path, asked: Sequence[str], present: Sequence[str]) -> No
             raise MtmError(f"{path} has no {name}; it has: {listed(present) or 'nothing with a pose'}")
 
 
-def choose(path: Path, present: Sequence[str]) -> MtmError:
+class SeveralPosesError(MtmError):
+    """A log holds several poses, the names of which are `offered`, and none was asked for."""
+
+    def __init__(self, sentence: str, offered: Sequence[str]) -> None:
+        super().__init__(sentence)
+        self.offered = tuple(offered)
+
+
+def choose(path: Path, present: Sequence[str]) -> SeveralPosesError:
     """The refusal of a log that holds several poses none of which was asked for."""
-    return MtmError(f"{path} holds several poses; name one or more with --topic: {listed(present)}")
+    return SeveralPosesError(f"{path} holds several poses; name one or more with --topic: {listed(present)}", present)

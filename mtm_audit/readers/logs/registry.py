@@ -24,6 +24,7 @@ from mtm_audit.readers.formats.tum import read_tum, recognises_tum
 from mtm_audit.readers.formats.ulog import read_ulog, recognises_ulog
 from mtm_audit.readers.formats.vicon import read_vicon, recognises_vicon
 from mtm_audit.readers.logs.body import Log, Warn, track_of
+from mtm_audit.readers.logs.choosing import SeveralPosesError
 from mtm_audit.readers.logs.opening import Opening, opening_of
 from mtm_audit.readers.logs.options import ReadOptions
 from mtm_audit.readers.logs.table import cells_of, separator_of
@@ -119,6 +120,8 @@ def read_log(path: Path, options: ReadOptions | None = None, warn: Warn | None =
         log = (format_of(opening) or _likeliest(opening)).read(path, asked, told)
         tracks = tuple(track_of(body, str(path), told) for body in log.bodies) + log.tracks
         return Contents(_distinct(path, tracks), log.at)
+    except SeveralPosesError as error:
+        raise SeveralPosesError(_printable(str(error)), [_printable(name) for name in error.offered]) from error
     except MtmError as error:
         raise MtmError(_printable(str(error))) from error
 

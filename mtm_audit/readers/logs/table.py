@@ -84,6 +84,11 @@ def read_table(
             )
             rows.append(list(numbers))
         except ValueError as error:
+            if not rows and not any(_is_number(cell, separator) for cell in cells_of(line, separator)):
+                raise MtmError(
+                    f"{path} is no log or motion capture of a format that is read (docs/formats.md): line {number} is "
+                    f"not {columns} numbers, {form}; name another file"
+                ) from error
             raise MtmError(
                 f"{path}, line {number}: expected {columns} numbers, {form}; mend or remove the line"
             ) from error
@@ -99,6 +104,13 @@ def _number(cell: str, separator: str | None) -> float:
     if separator != "," and _DECIMAL_COMMA.fullmatch(cell):
         cell = cell.replace(",", ".")
     return float(cell)
+
+
+def _is_number(cell: str, separator: str | None) -> bool:
+    try:
+        return not np.isnan(_number(cell, separator))
+    except ValueError:
+        return False
 
 
 def check_rows(path: Path, lines: Sequence[int], times_s: Floats, positions_m: Floats) -> None:

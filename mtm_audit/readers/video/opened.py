@@ -1,5 +1,6 @@
 """Opening a video file and choosing the stream of pictures that moves."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,7 +20,8 @@ _STILL_CODECS = frozenset({"bmp", "gif", "jpeg2000", "mjpeg", "png", "tiff", "we
 def opened_video(path: Path) -> Iterator[tuple["InputContainer", "VideoStream"]]:
     """Yield container and stream, set up to decode with as many threads as suit the machine.
 
-    Raises MtmError when the file is missing, empty, a folder, or holds no film.
+    Raises MtmError when the file is missing, empty, a folder, or holds no film, and for whatever of `decoding_errors`
+    is raised while it is open and not caught there.
     """
     import av
 
@@ -30,19 +32,33 @@ def opened_video(path: Path) -> Iterator[tuple["InputContainer", "VideoStream"]]
         raise MtmError(
             f"{path} is not a video that can be read, or its end is missing; copy it again or convert it to MP4"
         ) from error
-    with container:
-        stream = film_of(path, container)
-        # Damage is to stop the decoder: pictures that it patches up look plausible and are wrong.
-        stream.codec_context.options = {"err_detect": "explode"}
-        stream.thread_type = "AUTO"
-        yield container, stream
+    try:
+        with container:
+            stream = film_of(path, container)
+            # Damage is to stop the decoder: pictures that it patches up look plausible and are wrong.
+            stream.codec_context.options = {"err_detect": "explode"}
+            stream.thread_type = "AUTO"
+            yield container, stream
+    except decoding_errors() as error:
+        raise MtmError(
+            f"{path} is a video that cannot be read ({_reason(error)}); copy it again or convert it to MP4"
+        ) from error
 
 
 def decoding_errors() -> tuple[type[Exception], ...]:
-    """What the library raises for files that are damaged or not what they seem."""
+    """What the libraries raise for files that are damaged or not what they seem: of their own, and of the language's.
+
+    Sizes and rates that such a file states ask for more memory than there is, or for a division by zero.
+    """
     import av
 
-    return av.FFmpegError, OSError, ValueError
+    # What was not imported raises nothing, and importing it takes long.
+    opencv = [sys.modules["cv2"].error] if "cv2" in sys.modules else []
+    return av.FFmpegError, OSError, EOFError, ValueError, ArithmeticError, MemoryError, RuntimeError, *opencv
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(str(error).split())[:160] or type(error).__name__
 
 
 def film_of(path: Path | str, container: "InputContainer") -> "VideoStream":

@@ -42,6 +42,13 @@ def test_the_caption_hides_nothing_of_the_picture():
     assert picture[360:].max() == 255
 
 
+def test_a_caption_too_long_for_the_picture_goes_on_below():
+    short, long = draw(GRAY, [], ("one line",)), draw(GRAY, [], ("many words " * 12,))
+    assert long.shape[1] == short.shape[1]
+    assert long.shape[0] >= short.shape[0] + text_px(360)
+    assert draw(GRAY, [], ("W" * 200,)).shape == short.shape
+
+
 def test_a_thing_out_of_sight_is_drawn_at_its_last_place():
     trail = np.array([[100.0, 100.0], [120.0, 100.0], [np.nan, np.nan]])
     lost = Mark(name="a", place=None, trail=trail, colour=ORANGE)
@@ -70,6 +77,14 @@ def test_labels_do_not_lie_on_each_other():
     alone = [has_colour(draw(GRAY, [mark]), mark.colour).sum() for mark in marks]
     for mark, count in zip(marks, alone, strict=True):
         assert has_colour(picture, mark.colour).sum() > 0.5 * count
+
+
+def test_a_label_that_found_no_room_is_led_to_its_mark():
+    crowd = [Mark(name="WWWWWWWW", place=(240 + 3 * n, 200 + 2 * n), colour=colour_of(n)) for n in range(8)]
+    last = crowd[-1]
+    led = has_colour(draw(GRAY, crowd), last.colour).sum()
+    alone = has_colour(draw(GRAY, [last]), last.colour).sum()
+    assert led > alone
 
 
 @pytest.mark.parametrize("place", [(-500.0, 20.0), (479.0, 359.0), (0.0, 0.0), (1e6, -1e6)])

@@ -1,4 +1,5 @@
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -10,6 +11,7 @@ from mtm_audit.cli import main
 from mtm_audit.planning.table import AccuracyPoint, AccuracyTable, read_table, write_table
 from mtm_onboard.cli import main as onboard
 from mtm_onboard.protocol import Channel, Key, Scheme, load_key, save_key
+from mtm_onboard.protocol.schemefile import load_scheme
 from tests.audit.planning.paper import paper_table
 
 LANDER = paper_table("lander")
@@ -73,7 +75,7 @@ def test_interpolation_is_said(audit):
 def test_the_scheme_file_is_provisioned_as_a_key(audit, folder):
     code, out, _ = audit("plan", "lander.csv", *JOB[:2], *JOB[4:], "--like", "lander.key", "--out", "plan.toml")
     assert code == 0
-    assert out.endswith("wrote plan.toml\n")
+    assert "wrote plan.toml: scheme " in out
     assert onboard(["keygen", "--id", "fake-key", "--scheme", "plan.toml", "--out", "planned.key"]) == 0
     scheme = load_key(folder / "planned.key").scheme
     assert (scheme.alphabet_size, scheme.message_ticks, scheme.combine) == (4, 576, "split")
@@ -154,7 +156,8 @@ def test_a_picture_is_drawn(audit, suffix):
 def test_what_cannot_be_planned_is_refused_with_nothing_written(audit, folder, options, says):
     before = sorted(os.listdir(folder))
     code, out, err = audit("plan", "lander.csv", *options)
-    assert (code, out) == (1, "")
+    wrong = {"send a longer payload in several messages", "choose one above 0 and below 1", "is no picture format"}
+    assert (code, out) == (2 if says in wrong else 1, "")
     assert err.startswith("mtm-audit: ")
     assert err.count("\n") == 1
     assert says in err
@@ -180,13 +183,49 @@ def test_a_plan_that_breaks_off_leaves_the_former_scheme(audit, folder, monkeypa
     def interrupted(*_args, **_kwargs):
         raise KeyboardInterrupt
 
-    (folder / "plan.toml").write_text("the former one")
+    (folder / "plan.toml").write_text("# mtm-audit plan: the former one")
     monkeypatch.setattr("mtm_onboard.protocol.schemefile.scheme_text", interrupted)
     code, out, err = audit("plan", "lander.csv", *JOB[:2], *JOB[4:], "--like", "lander.key", "--out", "plan.toml")
     assert (code, out) == (130, "")
     assert err == "mtm-audit: interrupted; nothing was written\n"
-    assert (folder / "plan.toml").read_text() == "the former one"
+    assert (folder / "plan.toml").read_text() == "# mtm-audit plan: the former one"
     assert not [name for name in os.listdir(folder) if name.startswith(".")]
+
+
+def test_an_interval_below_the_target_is_told_and_sure_lifts_it(audit):
+    _, plain, _ = audit("plan", "lander.csv", *JOB)
+    begins = re.search(r"split: its interval begins at (0\.\d+), below the target; --sure plans", plain)
+    assert float(begins[1]) < 0.9
+    code, sure, _ = audit("plan", "lander.csv", *JOB[:-1], "--sure")
+    assert code == 0
+    assert sure.startswith("fastest for 10 bits at 0.9 surely: ")
+    assert "below the target; --sure" not in sure
+    lasts = [float(re.search(r"T = (\d+)", text)[1]) for text in (plain, sure)]
+    assert lasts[0] < lasts[1]
+
+
+def test_a_plan_that_no_window_makes_sure_is_refused(audit):
+    code, _, err = audit("plan", "lander.csv", *JOB[:-1], "--accuracy", "0.97", "--sure")
+    assert code == 1
+    assert "0.97 surely: the interval of the best begins at 0.956" in err
+
+
+@pytest.mark.parametrize(("trials", "code"), [(2, 1), (4, 1), (10, 0)])
+def test_trials_too_few_for_the_target_are_refused(audit, trials, code):
+    points = [AccuracyPoint("x", 4, ticks, trials, trials) for ticks in (100, 200)]
+    write_table(Path("few.csv"), AccuracyTable(tuple(points)))
+    ended, _, err = audit("plan", "few.csv", "--bits", "2", "--rate", "50", "--accuracy", "0.9")
+    assert ended == code
+    assert ("measure about 10 or more of each window" in err) == bool(code)
+
+
+def test_a_plan_names_the_scheme_that_it_makes(audit):
+    code, out, _ = audit("plan", "lander.csv", *JOB[:2], *JOB[4:], "--like", "lander.key", "--out", "plan.toml")
+    assert code == 0
+    name, fingerprint = re.search(r"wrote plan.toml: scheme (\S+) \(fingerprint ([0-9a-f]{16})\)", out).groups()
+    assert re.fullmatch(r"lander-split-M4-T\d+", name)
+    made = load_scheme(Path("plan.toml"))
+    assert (made.name, made.fingerprint) == (name, fingerprint)
 
 
 def test_duration_is_in_seconds(audit):

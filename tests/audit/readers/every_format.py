@@ -40,5 +40,7 @@ LOGS = {
     "foxglove json": partial(logs.write_foxglove, encoding="json"),
 }
 ALL = {**TEXT, **LOGS}
+# Read without a library made for them.
+OURS = (*TEXT, "crazyflie card", "crazyflie card of version 1")
 # Headings of markers count from the frame in their middle.
 FROM_MARKERS = ("c3d", "vicon nexus", "qualisys 3d")

@@ -3,11 +3,13 @@
 import sqlite3
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from mtm_audit.ingest.recording import read_recording
+from mtm_audit.readers.formats.dataflash import _Formats
 from mtm_audit.readers.logs.options import ReadOptions
 from mtm_audit.readers.logs.registry import read_log
 from mtm_onboard.protocol import MtmError
@@ -95,6 +97,23 @@ def test_damage_in_a_dataflash_log_is_not_printed(tmp_path, capfd):
     path.write_bytes(data)
     assert 280 <= len(read_log(path).tracks[0].times_s) < 301
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("said_bytes", [0, 1, 2])
+def test_messages_shorter_than_their_head_are_refused(said_bytes):
+    forms = _Formats({0x80: SimpleNamespace(name="FMT", len=89)})
+    with pytest.raises(ValueError, match=f"messages ATT are said to have {said_bytes} bytes"):
+        forms[10] = SimpleNamespace(name="ATT", len=said_bytes)
+    forms[10] = SimpleNamespace(name="ATT", len=3)
+    assert sorted(forms) == [10, 0x80]
+
+
+def test_every_format_of_a_dataflash_log_is_checked(tmp_path, monkeypatch):
+    checked = []
+    monkeypatch.setattr(_Formats, "__setitem__", lambda self, number, form: checked.append(form.name))
+    with pytest.raises(MtmError, match="without a position"):
+        read_log(write_dataflash(tmp_path, POSE))
+    assert {"XKF1", "GPS"} <= set(checked)
 
 
 def test_each_vehicle_of_a_telemetry_log_is_a_body(tmp_path):

@@ -147,7 +147,7 @@ def test_json_says_the_same_for_programs(run, capsys):
 def test_a_picture_s_wrong_name_is_refused_before_the_reading(run, tmp_path, capsys):
     assert audit(run[0], "--plot", tmp_path / "run.png") == 0
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG\r\n")
-    assert audit(tmp_path / "none.csv", "--plot", tmp_path / "run.txt") == 1
+    assert audit(tmp_path / "none.csv", "--plot", tmp_path / "run.txt") == 2
     assert "no picture format" in capsys.readouterr().err
 
 

@@ -63,7 +63,7 @@ def test_a_channel_without_a_track_is_remarked():
     warnings, _, _ = told(track(1))
     assert warnings == (
         "no track shows robot0, so channel robot0 was not read; film it, or use --assign",
-        "not seen: symbol 0, which robot0 sends; record that robot too, or name its track with --assign",
+        "not seen: symbol 0, the part of robot0; record that robot too, or name its track with --assign",
     )
 
 
@@ -145,7 +145,7 @@ def test_the_advised_length_grows_with_the_doubt(posterior, words):
     posteriors[1, 2] = posterior
     doubtful = replace(decoding, verdict="inconclusive", message=None, posteriors=posteriors)
     (sentence,) = advice(recording, doubtful)
-    assert sentence.startswith("uncertain: symbol 1, which robot1 sends; ")
+    assert sentence.startswith("uncertain: symbol 1, the part of robot1; ")
     assert words in sentence
 
 

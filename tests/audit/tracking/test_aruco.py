@@ -9,7 +9,7 @@ from hil.sensors.optics import overhead
 from hil.sensors.scene import Painter, Scene, Sighting
 from mtm_audit.model.picture import Frame
 from mtm_audit.tracking.corners import refined_corners
-from mtm_audit.tracking.dictionaries import DICTIONARIES, cells_of, dictionary_of, reads_in_a_mirror
+from mtm_audit.tracking.dictionaries import DICTIONARIES, cells_of, dictionary_of, reads_in_a_mirror, shown_instead
 from mtm_audit.tracking.markers import MarkerFinder
 from mtm_audit.tracking.registry import tracker
 from mtm_onboard.protocol import MtmError
@@ -184,3 +184,46 @@ def test_a_marker_that_is_fast_from_its_first_frame_on_is_kept():
         shown = [Frame((first + number) / 30, one.image) for number, one in enumerate(quick)]
         (track,) = tracker("aruco").track([*blank, *shown])
         assert track.valid[first:].all()
+
+
+class Refusing:
+    """A detector that cannot refine a corner by its contour."""
+
+    def detectMarkers(self, image):  # noqa: N802, named by OpenCV
+        raise cv2.error("nContours.size() >= 2")
+
+
+def test_a_contour_that_refines_no_corner_hides_no_marker():
+    image = next(film(still(sheet("4x4_50", 3, 60)))).image
+    finder = MarkerFinder("4x4_50")
+    finder._everywhere = Refusing()
+    assert [one.number for one in finder.everywhere(image)] == [3]
+
+
+@pytest.mark.parametrize(("side_px", "count"), [(4, 0), (60, 1)])
+def test_what_has_less_than_a_pixel_a_cell_is_no_marker(side_px, count):
+    class Reading:
+        def detectMarkers(self, image):  # noqa: N802, named by OpenCV
+            quad = np.float32([[[20, 20], [20 + side_px, 20], [20 + side_px, 20 + side_px], [20, 20 + side_px]]])
+            return (quad,), np.array([[3]]), ()
+
+    finder = MarkerFinder("4x4_50")
+    finder._everywhere = Reading()
+    assert len(finder.everywhere(np.zeros(SIZE, np.uint8))) == count
+
+
+def test_writing_is_not_named_as_a_marker(monkeypatch):
+    def read(side_px):
+        class Reading:
+            def __init__(self, *_):
+                pass
+
+            def detectMarkers(self, image):  # noqa: N802, named by OpenCV
+                quad = np.float32([[[9, 9], [9 + side_px, 9], [9 + side_px, 9 + side_px], [9, 9 + side_px]]])
+                return (quad,), np.array([[1023]]), ()
+
+        monkeypatch.setattr("cv2.aruco.ArucoDetector", Reading)
+        return shown_instead([np.zeros(SIZE, np.uint8)] * 3, "4x4_50")
+
+    assert read(3) is None
+    assert "marker 1023 is" in read(40)

@@ -180,7 +180,8 @@ def test_an_unknown_tracker_is_refused_with_the_choices(name, says):
 def test_searching_nearby_finds_what_searching_everywhere_finds(tmp_path, monkeypatch):
     path = filmed(Camera(), tmp_path / "film.mp4")
     nearby = ArucoTracker().track(read_frames(path))
-    monkeypatch.setattr("mtm_audit.tracking.follower.FULL_SEARCH_EVERY_S", 0.0)
+    monkeypatch.setattr("mtm_audit.tracking.follower.SEARCH_EVERY_S", 0.0)
+    monkeypatch.setattr("mtm_audit.tracking.follower.FULL_SEARCH_EVERY", 1)
     everywhere = ArucoTracker().track(read_frames(path))
     for one, other in zip(nearby, everywhere, strict=True):
         assert np.array_equal(one.valid, other.valid)

@@ -56,12 +56,13 @@ def run(out):
     return demo(out, console), console.file.getvalue()
 
 
-def test_the_demo_is_good_when_only_the_right_key_reads(programs, tmp_path):
+def test_the_demo_is_good_when_only_the_right_key_reads(programs, tmp_path, capfd):
     programs(GOOD)
     is_good, text = run(tmp_path / "demo")
     assert is_good
     assert text.count("10110010 (178)") == 3
     assert text.count("as it should be") == 4
+    assert f"told in {tmp_path / 'demo' / 'report.html'}" in capfd.readouterr().out
 
 
 @pytest.mark.parametrize(

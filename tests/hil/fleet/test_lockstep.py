@@ -95,23 +95,8 @@ def test_the_fleet_s_scheme_is_the_key_generator_s_preset(tmp_path, capsys):
         ({"symbols": (0, 1)}, "2 symbols given"),
         ({"symbols": (0, 1, 2, 4)}, "outside the alphabet"),
         ({"seed": -1}, "seed is -1"),
-        (
-            {
-                "key": Key(
-                    "x",
-                    FAKE_SECRET,
-                    Scheme(
-                        name="x",
-                        rate_hz=50.0,
-                        band_hz=(0.5, 5.0),
-                        alphabet_size=4,
-                        message_ticks=100,
-                        channels=(Channel("a", "a", ("vx",), 1, 0.1),),
-                    ),
-                )
-            },
-            "1 channels and this world 4 robots",
-        ),
+        ({"robots": 3}, "moves 4 bodies; give --robots 4 or more"),
+        ({"robots": 13}, "13 robots do not fit into the arena; it holds 12"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused_in_one_sentence(changes, sentence):

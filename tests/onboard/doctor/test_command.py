@@ -23,7 +23,8 @@ path = "{journal}"
 """
 DOCUMENT = Path(__file__).parents[3] / "docs" / "doctor.md"
 CHECKS = [
-    "configuration", "key", "fit", "link", "source", "control", "journal", "clock", "processors", "realtime", "loop",
+    "configuration", "key", "grant", "fit", "link", "source", "control", "journal", "state", "clock", "processors",
+    "realtime", "loop",
 ]  # fmt: skip
 
 

@@ -110,7 +110,7 @@ def test_missing_folder_and_binary_files_are_refused(tmp_path):
     binary = tmp_path / "binary.key"
     binary.write_bytes(bytes(range(128, 256)))
     os.chmod(binary, 0o600)
-    with pytest.raises(MtmError, match="not valid TOML"):
+    with pytest.raises(MtmError, match="is no key file"):
         load_key(binary)
 
 

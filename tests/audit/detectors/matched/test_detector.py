@@ -7,6 +7,7 @@ from mtm_audit.detectors.base import Observation
 from mtm_audit.detectors.matched import detector
 from mtm_audit.detectors.matched.detector import MatchedDetector
 from mtm_audit.model.glimpse import glimpse_of_track
+from mtm_onboard.protocol import Codebook
 from tests.audit.detectors.matched.fleet_motion import START_S, fleet_run
 
 
@@ -50,3 +51,15 @@ def test_a_timing_that_needs_no_refining_is_read_once(run, monkeypatch):
     readings = read(run)
     assert len(estimates) == 1
     assert [int(np.argmax(reading.scores)) for reading in readings] == list(run.symbols)
+
+
+def test_windows_far_longer_than_the_recording_are_not_sought(run, monkeypatch):
+    """The search would take a memory of their length, 17 GB for ten minutes."""
+    scheme = replace(run.key.scheme, message_ticks=30_000 * len(run.key.scheme.channels))
+    monkeypatch.setattr(detector, "search_timings", lambda *asked, **named: pytest.fail("searched"))
+    channel = scheme.channels[0]
+    seen = glimpse_of_track(run.tracks[0])
+    codebook = Codebook(b"another fake test secret 1234567", scheme)
+    (refusal,) = MatchedDetector().read(codebook, [], [Observation(channel, seen)], START_S)
+    assert "less than a third of a window" in str(refusal)
+    assert np.isnan(MatchedDetector().strengths([codebook], [channel], [seen], None)).all()

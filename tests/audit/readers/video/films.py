@@ -23,6 +23,17 @@ class Encoding:
     rate_hz: int = RATE_HZ
 
 
+KINDS = {
+    "film.mp4": Encoding(),
+    "film.mkv": Encoding(),
+    "film.ts": Encoding(),
+    "film.avi": Encoding(),
+    "film.h264": Encoding(format="h264"),
+    "hevc.mp4": Encoding(codec="libx265", options={"x265-params": "log-level=none"}),
+    "mjpeg.avi": Encoding(codec="mjpeg", pixel_format="yuvj420p"),
+}
+
+
 def pictures(count):
     """Blocks of colour that move by three pixels each time."""
     return [np.roll(BLOCKS, 3 * number, axis=1) for number in range(count)]

@@ -33,6 +33,6 @@ def test_the_plant_s_file_says_how_it_was_made_and_reads_back(tmp_path):
     plant = calibrated_parameters()
     write_plant(tmp_path / "plant.toml", plant, replace(PERFECT, slip_mps=0.0425), "mtm-hil calibrate -n 20")
     text = (tmp_path / "plant.toml").read_text()
-    assert text.startswith("# Written by: mtm-hil calibrate -n 20\n")
+    assert text.startswith("# mtm-hil calibrate -n 20\n")
     assert "# T =  200: margin 0.102, paper 0.102, ratio 1.00, symbols 100.0 %\n" in text
     assert calibrated_parameters(tmp_path / "plant.toml") == replace(plant, slip_mps=0.0425)

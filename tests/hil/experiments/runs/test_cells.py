@@ -43,10 +43,10 @@ def test_what_other_code_computed_is_not_used(tmp_path):
         assert store.find(A) == {"margin": 0.25}
 
 
-@pytest.mark.parametrize("line", [b"hello\n", b"[]\n", b'{"code": "x"}\n'])
+@pytest.mark.parametrize("line", [b"hello\n", b"[]\n", b'{"code": "x"}\n', b"no end", b'{"coda'])
 def test_a_file_that_is_no_store_is_refused_and_kept(tmp_path, line):
     (tmp_path / "cells.jsonl").write_bytes(line)
-    with pytest.raises(MtmError, match=r"line 1.*remove the file"):
+    with pytest.raises(MtmError, match=r"line 1.*another file"):
         CellStore(tmp_path / "cells.jsonl", code="x")
     assert (tmp_path / "cells.jsonl").read_bytes() == line
 

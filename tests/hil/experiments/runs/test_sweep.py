@@ -2,13 +2,16 @@ import importlib
 import io
 import os
 import sys
+import threading
 
 import pytest
 from rich.console import Console
 
 from hil.experiments.runs.cells import Cell, CellStore
-from hil.experiments.runs.sweep import run_sweep
+from hil.experiments.runs.sweep import run_sweep, swept_on
 from mtm_onboard.protocol import MtmError
+from tests.audit.batch.cluster_of_three import cluster_of
+from tests.patience import until
 
 QUIET = Console(file=io.StringIO())
 
@@ -16,9 +19,16 @@ QUIET = Console(file=io.StringIO())
 # Another process imports what it computes from a module.
 MODULE = """
 import os
+import time
 
 def square(parameters, seed):
     return {"square": parameters["x"] ** 2 + seed, "process": os.getpid(), "threads": os.environ["OMP_NUM_THREADS"]}
+
+def logged(parameters, seed):
+    with open(parameters["log"], "a") as log:
+        log.write(f"{seed}\\n")
+    time.sleep(0.2)
+    return {"twice": 2 * seed}
 
 def ended_from_outside(parameters, seed):
     os._exit(1)
@@ -76,3 +86,32 @@ def test_a_cell_that_is_asked_for_twice_is_computed_once(tmp_path):
 def test_a_process_that_is_ended_from_outside_gets_one_sentence(module, tmp_path):
     with CellStore(tmp_path / "cells.jsonl") as store, pytest.raises(MtmError, match="finished cells are kept"):
         run_sweep(module.ended_from_outside, cells(2), store, QUIET, workers=2)
+
+
+@pytest.mark.long
+def test_a_cluster_that_loses_a_worker_computes_the_same(module, tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}")
+    log = tmp_path / "log"
+    asked = [Cell("logged", {"log": str(log)}, seed) for seed in range(24)]
+
+    def kill(worker):
+        until(lambda: log.exists() and len(log.read_text().splitlines()) > 6)
+        worker.kill()
+
+    with cluster_of(tmp_path) as cluster, CellStore(tmp_path / "cells.jsonl") as store, swept_on(cluster.address):
+        killer = threading.Thread(target=kill, args=cluster.workers[:1])
+        killer.start()
+        results = run_sweep(module.logged, asked, store, QUIET)
+        killer.join()
+        begun = len(log.read_text().splitlines())
+        assert run_sweep(module.logged, asked, store, QUIET) == results
+    assert results == [{"twice": 2 * seed} for seed in range(24)]
+    assert len((tmp_path / "cells.jsonl").read_text().splitlines()) == 24
+    assert len(log.read_text().splitlines()) == begun >= 24
+
+
+def test_a_cluster_is_not_used_outside_its_block(tmp_path):
+    with swept_on("tcp://127.0.0.1:9"):
+        pass
+    with CellStore(tmp_path / "cells.jsonl") as store:
+        assert run_sweep(lambda parameters, seed: {"x": 1}, cells(1), store, QUIET, workers=1) == [{"x": 1}]

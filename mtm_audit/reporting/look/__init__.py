@@ -1,0 +1,1 @@
+"""What a survey found, as text, as JSON, and as a picture to read regions off."""

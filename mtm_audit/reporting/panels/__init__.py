@@ -1,0 +1,1 @@
+"""The parts of a decode's picture, each drawn into axes of its own."""
