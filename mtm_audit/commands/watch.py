@@ -3,9 +3,9 @@
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,7 +26,6 @@ from mtm_audit.live.state import WatchState
 from mtm_audit.live.terminal import Board
 from mtm_audit.live.watching import Film, Gathering, Poses, Watch
 from mtm_audit.model.picture import Frame
-from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.recording import Kind, Recording
 from mtm_audit.reporting.remarks import remarks
 from mtm_audit.reporting.text import print_report, verdict_sentence
@@ -42,7 +41,7 @@ if TYPE_CHECKING:
 class WatchOptions:
     """What the command line asked for; `page` is a port, 0 for any, None for no page; `seconds` None for no end.
 
-    `at` None takes now for a live source, `at_error_s` give or take.
+    `at_unix_s` is when the first thing was seen, give or take `at_error_s`; None takes now for a live source.
     """
 
     source: str
@@ -87,14 +86,14 @@ def run_watch(options: WatchOptions) -> int:
     served = None if options.page is None else _page_class()
     film = Film(following(options.tracker), options.reference) if source.is_film else None
     gathering: Gathering = film or Poses()
-    settings = replace(options.settings, at=_recorded_at(options, source, opened))
-    state = WatchState(source.shown, opened.key, settings.threshold)
+    wall = _wall(options, source, opened)
+    state = WatchState(source.shown, opened.key, options.settings.threshold)
     console = Console(stderr=True)
     with ExitStack() as stack:
         folder = None if options.record is None else new_folder(options.record)
         film_record = stack.enter_context(FilmRecord(folder)) if folder and source.is_film else None
         pose_record = stack.enter_context(PoseRecord(folder)) if folder and not source.is_film else None
-        judge = JudgeBeside(opened.key, settings)
+        judge = JudgeBeside(opened.key, options.settings)
         stack.callback(judge.close)
         page = None
         if served is not None:
@@ -104,13 +103,14 @@ def run_watch(options: WatchOptions) -> int:
         stack.callback(feed.stop)
         show = _Show(state, film, pose_record, is_plain=not console.is_terminal)
         watch = Watch(
-            opened.key.scheme, gathering, judge, show, waits=not source.is_live, most_s=options.seconds
+            opened.key.scheme, gathering, judge, show, waits=not source.is_live, most_s=options.seconds,
+            wall=wall, wall_error_s=options.at_error_s,
         )  # fmt: skip
         with Board(state, console, None if page is None else page.url), _until_interrupted(show):
             watch.run(feed)
         answer = _answer(watch, opened)
         state.finished(answer, decoded=watch.is_decided)
-        text, code = _report(watch, opened, source, settings, answer)
+        text, code = _report(watch, opened, source, answer)
         sys.stdout.write(text)
         sys.stdout.flush()
         if page is not None:
@@ -136,15 +136,22 @@ def _until_interrupted(show: _Show) -> Iterator[None]:
         show.noticed("interrupted; this is the best answer so far")
 
 
-def _recorded_at(options: WatchOptions, source: Source, opened: OpenedKey) -> RecordedAt | None:
-    """When the watch's own clock stands at zero; of a live source that is now."""
-    if options.at_unix_s is not None:
-        return RecordedAt(options.at_unix_s, options.at_error_s)
-    if source.is_live or opened.key.scheme.schedule == "fixed":
-        return RecordedAt(time.time(), options.at_error_s)
-    raise MtmError(
-        "this key's schedule is rolling, so that its waveforms follow the clock; say when the file was begun with --at"
-    )
+def _wall(options: WatchOptions, source: Source, opened: OpenedKey) -> Callable[[], float] | None:
+    """What tells the time of day of the first thing seen: what was said, or of a live source this machine's clock.
+
+    None where nobody says so. Raises MtmError when that is needed.
+    """
+    begun_s = options.at_unix_s
+    if begun_s is not None:
+        return lambda: begun_s
+    if source.is_live:
+        return time.time
+    if opened.key.scheme.schedule == "rolling":
+        raise MtmError(
+            "this key's schedule is rolling, so that its waveforms follow the clock; say when the file was begun with "
+            "--at"
+        )
+    return None
 
 
 def _answer(watch: Watch, opened: OpenedKey) -> str:
@@ -161,7 +168,7 @@ def _answer(watch: Watch, opened: OpenedKey) -> str:
     return f"absent: no message of key {opened.key.id} was found so far"
 
 
-def _report(watch: Watch, opened: OpenedKey, source: Source, settings: DecodeSettings, answer: str) -> tuple[str, int]:
+def _report(watch: Watch, opened: OpenedKey, source: Source, answer: str) -> tuple[str, int]:
     """What is printed at the end, and the exit code."""
     best = watch.best
     if best is None or best.decoding is None:
@@ -169,7 +176,7 @@ def _report(watch: Watch, opened: OpenedKey, source: Source, settings: DecodeSet
         return f"{answer}\n{glances}\n", EXIT_CODES["absent"]
     decoding: Decoding = best.decoding
     kind: Kind = "video" if source.is_film else "motion capture"
-    recording = Recording((Path(source.shown),), kind, best.tracks, best.warnings, settings.at)
+    recording = Recording((Path(source.shown),), kind, best.tracks, best.warnings, watch.at)
     basis = opened.basis(recording, decoding, stated=True)
     key_warning = () if opened.key.warning is None else (opened.key.warning,)
     console = Console(width=None if sys.stdout.isatty() else PIPE_COLUMNS, markup=False, emoji=False)

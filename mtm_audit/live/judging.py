@@ -18,6 +18,7 @@ from mtm_audit.decoding.start import start_of
 from mtm_audit.decoding.views import view_strengths
 from mtm_audit.detectors import make_detector
 from mtm_audit.live.looks import Look
+from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.track import Track
 from mtm_audit.tracking.background import BackgroundFollower
 from mtm_audit.tracking.stabilise import without_camera
@@ -34,13 +35,15 @@ WHOLE_EVERY = 8
 class Seen:
     """What a watch had seen when it was looked at; `background` tells how the camera moved, None without one.
 
-    Tracks of mirrored pictures are `flipped`, and `reference` names those that stand still.
+    Tracks of mirrored pictures are `flipped`, and `reference` names those that stand still. `at` is when the watch's
+    own clock stood at zero, None where the settings of the decode say so.
     """
 
     tracks: tuple[Track, ...]
     background: BackgroundFollower | None = None
     flipped: bool = False
     reference: tuple[str, ...] = ()
+    at: RecordedAt | None = None
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,8 @@ def judge(look: Look, seen: Seen, key: Key, settings: DecodeSettings) -> Judged:
 
 
 def _judged(look: Look, seen: Seen, key: Key, settings: DecodeSettings) -> Judged:
+    if seen.at is not None:
+        settings = replace(settings, at=seen.at)
     warnings: list[str] = []
     tracks = list(seen.tracks)
     try:

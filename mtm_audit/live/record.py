@@ -2,6 +2,7 @@
 
 import math
 import re
+import threading
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -38,6 +39,8 @@ class FilmRecord:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        # What is read in a thread may come while the watch ends.
+        self._lock, self._is_closed = threading.Lock(), False
         self._output: OutputContainer | None = None
         self._stream: VideoStream | None = None
         self._coding: tuple[object, ...] = ()
@@ -53,7 +56,18 @@ class FilmRecord:
         self.close()
 
     def put(self, packet: "Packet[VideoStream]", shift_s: float) -> None:
-        """Write a packet, its times moved by `shift_s`; one without times is left out."""
+        """Write a packet, its times moved by `shift_s`; one without times is left out, and what comes after the end."""
+        with self._lock:
+            if not self._is_closed:
+                self._put(packet, shift_s)
+
+    def close(self) -> None:
+        """Finish the file, and take nothing more."""
+        with self._lock:
+            self._is_closed = True
+            self._finish()
+
+    def _put(self, packet: "Packet[VideoStream]", shift_s: float) -> None:
         if packet.dts is None or packet.pts is None or packet.time_base is None:
             return
         self._begin_file_for(packet)
@@ -71,8 +85,7 @@ class FilmRecord:
         except OSError as error:
             raise MtmError(f"cannot write {self.files[-1]}: {error.strerror}; make room and watch again") from error
 
-    def close(self) -> None:
-        """Finish the file."""
+    def _finish(self) -> None:
         if self._output is not None:
             self._output.close()
             self._output = None
@@ -85,7 +98,7 @@ class FilmRecord:
             return
         import av
 
-        self.close()
+        self._finish()
         self.files.append(self._folder / f"film{len(self.files) + 1}.mkv")
         try:
             self._output = av.open(str(self.files[-1]), "w", format="matroska")

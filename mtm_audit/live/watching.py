@@ -1,7 +1,7 @@
 """Watching: what a source shows is gathered, looked at when it is time, and left at the verdict."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from mtm_audit.decoding.paid import worth
@@ -12,6 +12,7 @@ from mtm_audit.live.judging import Judged, Seen
 from mtm_audit.live.looks import Look, Looks, final_look
 from mtm_audit.live.poses import PoseTracks
 from mtm_audit.model.picture import Frame
+from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.tracking.background import BackgroundFollower
 from mtm_audit.tracking.following import Following
 from mtm_onboard.protocol.scheme import Scheme
@@ -108,6 +109,8 @@ class Watch:
 
     With `waits` nothing is taken in while a look is judged: for files, which lose nothing by waiting, and whose verdict
     then does not depend on how fast the machine is. `most_s` ends the watch after so long, None at the verdict alone.
+    `wall` tells the time of day in seconds since the Unix epoch, give or take `wall_error_s`, by which a rolling
+    schedule is read; None where the judge knows when the watch was begun.
     """
 
     scheme: Scheme
@@ -116,6 +119,9 @@ class Watch:
     audience: Audience
     waits: bool = False
     most_s: float | None = None
+    wall: Callable[[], float] | None = None
+    wall_error_s: float = 0.0
+    at: RecordedAt | None = None
     best: Judged | None = None
     last: Judged | None = None
     watched_s: float = 0.0
@@ -158,6 +164,8 @@ class Watch:
     def _is_over(self, event: Frame | Pose) -> bool:
         if self._begin_s is None:
             self._begin_s = event.time_s
+            if self.wall is not None:
+                self.at = RecordedAt(self.wall() - event.time_s, self.wall_error_s)
         return self.most_s is not None and event.time_s - self._begin_s >= self.most_s
 
     def _take(self, event: Frame | Pose) -> None:
@@ -193,7 +201,8 @@ class Watch:
             self._is_told = True
             self.audience.noticed(f"the watch is long; each look is at its last {self._longest_s / 60.0:g} minutes")
         assert self._begin_s is not None
-        self.judge.begin(look, self.gathering.seen(self._begin_s + begin_s, self._begin_s + look.until_s))
+        seen = self.gathering.seen(self._begin_s + begin_s, self._begin_s + look.until_s)
+        self.judge.begin(look, replace(seen, at=self.at))
         if self.waits:
             self.judge.wait()
         self._collect()

@@ -23,11 +23,12 @@ LIBRARIES = {
     "serial": ["serial"],
     "mavlink": ["pymavlink"],
     "logs": ["ezc3d", "mcap", "mcap_protobuf", "pymavlink", "pyulog", "rosbags"],
+    "live": ["aiohttp"],
     "parquet": ["pyarrow"],
     "cluster": ["distributed"],
     "worlds": ["vmas", "mujoco", "Box2D"],
 }
-COMPLETE = ("audit", "logs", "parquet", "cluster", "hil", "worlds")
+COMPLETE = ("audit", "live", "logs", "parquet", "cluster", "hil", "worlds")
 
 pytestmark = pytest.mark.long
 

@@ -19,7 +19,7 @@ def test_a_file_waits_and_loses_nothing():
     assert feed.lost == 0
 
 
-def test_what_a_live_source_shows_too_fast_is_lost_counted_and_told_once():
+def test_what_comes_too_fast_is_lost_counted_and_told_once():
     read = threading.Event()
 
     def source():

@@ -20,6 +20,7 @@ from mtm_audit.live.events import Notice
 from mtm_audit.live.films import Address, FilmSource
 from mtm_audit.live.judges import JudgeHere
 from mtm_audit.live.record import FilmRecord
+from mtm_audit.live.sources import source_of
 from mtm_audit.live.watching import Film, Watch
 from mtm_audit.model.picture import Frame
 from mtm_audit.readers.video import read_frames
@@ -175,6 +176,20 @@ def test_a_watched_film_decodes_and_what_was_kept_does_too(filmed, tmp_path):
     assert count > 60
     assert np.allclose(kept.positions[:count], whole.positions[:count], equal_nan=True)
     assert np.ptp(kept.times_s[:count] - whole.times_s[:count]) < 2e-3
+
+
+def test_what_comes_after_the_end_is_not_kept(short, tmp_path):
+    record = FilmRecord(tmp_path)
+    for count, _ in enumerate(FilmSource(short, "gray", record, patience_s=0.0).events()):
+        if count == 10:
+            record.close()
+    assert len(record.files) == 1
+    assert 0 < len(list(read_frames(record.files[0]))) < 30
+
+
+def test_a_device_that_is_no_camera_is_one_sentence():
+    with pytest.raises(MtmError, match="cannot watch /dev/null"):
+        next(source_of("/dev/null").events("gray"))
 
 
 def test_a_film_that_grows_is_read_to_its_end(short, tmp_path):

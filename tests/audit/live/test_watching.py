@@ -12,6 +12,7 @@ from mtm_audit.live.events import Notice, Pose, Quiet
 from mtm_audit.live.judging import Seen, judge
 from mtm_audit.live.looks import Look
 from mtm_audit.live.poses import PoseTracks
+from tests.audit.decoding.test_framed_decode import NOON_S, ROLLING, rolling_tracks
 from tests.audit.live.watched import KEY, JudgeLater, poses, watch_of
 from tests.audit.moving_robot import OTHER_SECRET, key_of
 
@@ -140,3 +141,18 @@ def test_what_cannot_be_read_is_a_refusal_and_no_end():
     judged = judge(Look(8, 4.0, 90), still, KEY, DecodeSettings())
     assert judged.decoding is None
     assert judged.refusal
+
+
+@pytest.mark.parametrize(("late_s", "verdict"), [(0.0, "decoded"), (3600.0, "absent")])
+def test_a_rolling_schedule_is_read_by_the_time_of_day(late_s, verdict):
+    """What was seen first was seen a second before noon, whatever the sender's clock said."""
+    sent = [
+        Pose(track.name, 500.0 + float(time_s), float(x), float(y))
+        for track in rolling_tracks()
+        for time_s, (x, y) in zip(track.times_s[::4], track.positions[::4], strict=True)
+    ]
+    sent.sort(key=lambda pose: pose.time_s)
+    judge = JudgeLater(ROLLING, DecodeSettings(), asked=500)
+    watch, _ = watch_of(sent, judge, ROLLING, wall=lambda: NOON_S - 1.0 + late_s, wall_error_s=2.0, most_s=14.0)
+    assert watch.best.decoding.verdict == verdict
+    assert watch.best.decoding.message == (1234 if verdict == "decoded" else None)
