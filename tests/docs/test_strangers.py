@@ -1,11 +1,11 @@
 """A stranger's first hour, for each of the three users: the pages' commands in a clean folder, and what they print."""
 
-import os
 import re
 import shlex
 import shutil
 import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -47,6 +47,7 @@ def masked(text: str) -> list[str]:
     return [line for line in lines if line]
 
 
+@pytest.mark.realtime
 def test_a_roboticist_comes_from_a_key_to_a_running_robot(typed, tmp_path):
     lines = lines_of(ON_A_ROBOT, "From a key to a moving robot")
     assert [line.split()[1] for line in lines[:6]] == ["keygen", "issue", "issue", "show", "doctor", "run"]
@@ -75,9 +76,10 @@ def test_a_roboticist_comes_from_a_key_to_a_running_robot(typed, tmp_path):
 
 def ran_until(line: str, words: str) -> tuple[list[str], str]:
     """Run it, as its own refusal advises where nobody keeps this clock right, until it says so; then Ctrl-C."""
-    command = [*shlex.split(line), "--allow-unsynchronised"]
+    program, *arguments = shlex.split(line)
+    command = [sys.executable, "-m", PACKAGES[program], *arguments, "--allow-unsynchronised"]
     with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ,
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as running:  # fmt: skip
         assert running.stderr is not None
