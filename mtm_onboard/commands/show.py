@@ -1,7 +1,6 @@
 """`mtm-onboard show`: the scheme of a key file, never its secret."""
 
 import argparse
-from datetime import UTC
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -68,6 +67,8 @@ def _grant_lines(key: "Key") -> list[str]:
     days = (grant.last_day - grant.first_day).days + 1
     lines.append(f"days          {grant.first_day} to {grant.last_day} in UTC ({days})")
     if grant.not_after is not None:
+        from datetime import UTC
+
         lines.append(f"not after     {grant.not_after.astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC")
     return lines
 
