@@ -284,7 +284,8 @@ def watch(
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
     threshold: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="How often a message that is called decoded may be wrong.")
+        float,
+        typer.Option(metavar="P", min=1e-12, max=1.0, help="How often a message that is called decoded may be wrong."),
     ] = 1e-4,
     seconds: Annotated[
         float | None, typer.Option(metavar="N", min=0.1, help="End after so long (default: at the verdict alone).")
@@ -296,7 +297,10 @@ def watch(
         ),
     ] = None,
     record: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Keep what was seen in a new folder, which decode reads.")
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Keep what was seen in this folder, which must not exist; decode reads it."
+        ),
     ] = None,
     profile: Annotated[
         Path | None, typer.Option(metavar="FILE", help="What mtm-audit profile learnt about this type of robot.")

@@ -23,7 +23,7 @@ OUTPUTS = {("mtm-hil identify", "--profile")}
 # For parameters that must be given and are no files; files are made where they are named.
 VALUES = {
     "--bits": "8", "--rate": "50", "--id": "x", "--message": "1", "--day": "2025-01-02", "--serial": "0" * 16,
-    "world": "discovery",
+    "world": "discovery", "source": "udp://127.0.0.1:9",
 }  # fmt: skip
 # Where one of several must be given.
 ALSO = {

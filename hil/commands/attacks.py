@@ -13,6 +13,7 @@ from hil.experiments.attacks.report import draw_plot, line_of, write_csv
 from hil.experiments.runs.cells import CellStore
 from hil.worlds.registry import make_world
 from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol.output_file import check_outputs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +26,7 @@ class AttackOptions:
     workers: int | None
     out: Path | None
     plot: Path | None
+    force: bool
     cells: Path
 
     def command(self, attack: Attack) -> str:
@@ -35,22 +37,28 @@ class AttackOptions:
 def attacks(options: AttackOptions, console: Console) -> None:
     """Measure, print and, where asked, write and draw."""
     chosen = _chosen(options.names)
-    make_world("discovery")
-    if options.out is not None and not options.out.is_dir():
-        raise MtmError(f"{options.out} is no folder; make it, or name another")
+    if options.out is not None:
+        if not options.out.is_dir():
+            raise MtmError(f"{options.out} is no folder; make it, or name another")
+        check_outputs("mtm-hil attacks", *(_table(options.out, attack) for attack in chosen), force=options.force)
     groups: list[Sequence[Row]] = []
     with CellStore(options.cells) as store:
+        make_world("discovery")
         for attack in chosen:
             rows = measured(attack, options.rollouts, options.first_seed, store, console, options.workers)
             groups.append(rows)
             print("\n".join(line_of(row) for row in rows))
             if options.out is not None:
-                path = options.out / f"attacks_{attack.name}.csv"
+                path = _table(options.out, attack)
                 write_csv(path, attack, rows, options.command(attack))
                 print(f"wrote {path}")
     if options.plot is not None:
         draw_plot(options.plot, groups)
         print(f"wrote {options.plot}")
+
+
+def _table(folder: Path, attack: Attack) -> Path:
+    return folder / f"attacks_{attack.name}.csv"
 
 
 def _chosen(names: Sequence[str]) -> list[Attack]:

@@ -371,20 +371,28 @@ def forgeries(
 def attacks(
     *,
     rollouts: Annotated[
-        int, typer.Option("-n", min=1, help="Rollouts at each level of the paper's tables; others take a part.")
+        int,
+        typer.Option(
+            "-n", metavar="N", min=1, help="Rollouts at each level of the paper's tables; others take a part."
+        ),
     ] = 50,
     only: Annotated[list[str] | None, typer.Option(metavar="NAME", help="This attack; may be repeated.")] = None,
     seed: FirstSeed = 40_000,
     workers: Workers = None,
-    out: Annotated[Path | None, typer.Option(help="A folder to write attacks_NAME.csv in as well.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="A picture to draw: a panel for each attack.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="A folder to write attacks_NAME.csv in as well.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="A picture to draw: a panel for each attack.")
+    ] = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "attacks.jsonl",
 ) -> None:
     """Suppress, forge and spy on messages: the paper's two tables of attacks, and a curve for each that it leaves open.
 
     Stop it at any time: what is finished is kept, and the next run goes on.
     """
-    with reported_console() as console:
+    with reported_console("mtm-hil attacks", plot, force=force) as console:
         from hil.commands.attacks import AttackOptions
         from hil.commands.attacks import attacks as run
 
@@ -395,6 +403,7 @@ def attacks(
             workers=workers,
             out=out,
             plot=plot,
+            force=force,
             cells=cells,
         )
         run(options, console)

@@ -73,15 +73,16 @@ def _power(
 @verdicts.command("watched")
 def _watched(
     streams: Annotated[
-        int, typer.Option("-n", min=1, help="Streams of one silent robot each, watched for 60 s.")
+        int, typer.Option("-n", metavar="N", min=1, help="Streams of one silent robot each, watched for 60 s.")
     ] = 1000,
     seed: FirstSeed = _FIRST_SEED,
     workers: Workers = None,
     out: OutCsv = None,
+    force: Force = False,
     cells: Cells = CELLS_FOLDER / "verdicts_watched.jsonl",
 ) -> None:
     """Watch robots that send nothing, and count the verdicts."""
-    with reported_console() as console:
+    with reported_console("mtm-hil verdicts watched", out, force=force) as console:
         from hil.commands.verdicts import VerdictOptions, watched
 
         watched(VerdictOptions(streams, (), seed, workers, out, cells), console)

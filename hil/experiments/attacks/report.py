@@ -12,7 +12,7 @@ from hil.experiments.attacks.attack import Attack
 from hil.experiments.attacks.measured import Row
 from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.worlds.reading import COHERENCY, MATCHED
-from mtm_onboard.protocol.atomicfile import replacing
+from mtm_audit.reporting.figure_file import save_figure
 
 _COLUMNS = (
     "arm", "level", "reader", "trials", "right", "percent", "percent_low", "percent_high", "margin",
@@ -55,8 +55,7 @@ def draw_plot(path: Path, groups: Sequence[Sequence[Row]]) -> None:
         _panel(panel, rows)
     for panel in panels[len(groups) :]:
         panel.set_axis_off()
-    with replacing(path) as temporary:
-        figure.savefig(temporary, format=path.suffix.lower().removeprefix("."))
+    save_figure(figure, path, "mtm-hil attacks")
 
 
 def _panel(axes: Axes, rows: Sequence[Row]) -> None:
