@@ -116,7 +116,7 @@ def decode(
     ] = None,
     threshold: Annotated[
         float,
-        typer.Option(metavar="P", min=1e-12, max=1.0, help="How often a message that is called decoded may be wrong."),
+        typer.Option(metavar="P", min=1e-300, max=1.0, help="How often a message that is called decoded may be wrong."),
     ] = 1e-4,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON (docs/decode-json.md) instead of a table.")
@@ -285,7 +285,7 @@ def watch(
     ] = None,
     threshold: Annotated[
         float,
-        typer.Option(metavar="P", min=1e-12, max=1.0, help="How often a message that is called decoded may be wrong."),
+        typer.Option(metavar="P", min=1e-300, max=1.0, help="How often a message that is called decoded may be wrong."),
     ] = 1e-4,
     seconds: Annotated[
         float | None, typer.Option(metavar="N", min=0.1, help="End after so long (default: at the verdict alone).")

@@ -23,6 +23,8 @@ from mtm_onboard.protocol.slots import epoch_of_slot
 
 Integers = NDArray[np.int64]
 
+# What a slot's windows must say for a message to be counted as sent in it: odds of 20.
+_SAYS_NATS = 3.0
 # Ways to cut a recording in two that are tried at most; each costs a share of false acceptances.
 _MOST_CUTS = 32
 
@@ -133,10 +135,13 @@ class _Sight:
 
 
 def _says(ratios: Floats, symbols: Integers) -> bool:
-    """Whether windows (L, M) of one slot speak for these symbols: those before the message's first slot do not."""
+    """Whether windows (L, M) of one slot speak for these symbols: those before the message's first slot do not.
+
+    What a neighbour's delay leaves of a window lies around 0.
+    """
     # Log posteriors against those of chance, so that what was not seen counts nothing.
     gains = log_softmax(ratios, axis=1) + np.log(ratios.shape[1])
-    return float(gains[np.arange(len(symbols)), symbols].sum()) > 0.0
+    return float(gains[np.arange(len(symbols)), symbols].sum()) > _SAYS_NATS
 
 
 def _cuts(sights: Sequence[_Sight]) -> Iterator[tuple[_Sight, int]]:

@@ -126,7 +126,7 @@ def test_a_coarse_film_without_a_message_stays_absent(audit, tmp_path):
 
 def test_speed_and_search_exclude_each_other(audit, slow):
     assert audit(slow, "--speed", "4", "--search-speed")[0] == 2
-    assert audit(slow, "--speed", "-1")[0] == 1
+    assert audit(slow, "--speed", "-1")[0] == 2
 
 
 def test_two_frames_a_second_are_too_few_in_one_sentence(audit, folder, tmp_path):

@@ -258,7 +258,9 @@ def test_tracks_too_short_to_match_are_refused_in_a_sentence():
     with pytest.raises(MtmError, match="no track can be read as any channel; record longer"):
         decode_tracks(strangers(seconds=4.0), FLEET, KNOWN)
     with pytest.raises(MtmError, match="at least 3"):
-        decode_tracks([Track("dot", np.zeros(1), np.zeros((1, 2)), np.ones(1, bool))], PAIR, KNOWN)
+        decode_tracks(
+            [Track("dot", np.zeros(1), np.zeros((1, 2)), np.ones(1, bool))], PAIR, replace(KNOWN, onset_s=None)
+        )
 
 
 def test_evidence_in_bits_is_what_the_p_value_says():
@@ -316,8 +318,8 @@ def test_evidence_near_the_limit_gets_more_decoys_and_only_then(monkeypatch, p_v
     def decoded(tracks, key, settings, progress):
         tried.append(settings.decoys)
         evidence = Evidence(None, replace(found.evidence.decoys, p_value=p_value))
-        return replace(found, verdict="absent", evidence=evidence, settings=settings)
+        return replace(found, verdict="absent", evidence=evidence, settings=settings), None
 
-    monkeypatch.setattr("mtm_audit.decoding.decode._decoded", decoded)
+    monkeypatch.setattr("mtm_audit.decoding.decode.decoded_once", decoded)
     assert decode_tracks(pair(), PAIR, KNOWN).settings.decoys == looks[-1]
     assert tried == looks

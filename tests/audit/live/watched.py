@@ -9,7 +9,7 @@ from mtm_audit.live.watching import Poses, Watch
 from tests.audit.moving_robot import key_of, robot_track, scheme_of
 
 KEY = key_of(scheme_of(symbols=(1,), ticks=200))
-SECONDS = 8.0
+SECONDS = 10.0
 
 
 def poses(symbols=(2,), seconds=SECONDS, key=KEY, begin_s=0.0, rate_hz=25.0):

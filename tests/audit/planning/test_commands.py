@@ -150,7 +150,7 @@ def test_a_picture_is_drawn(audit, suffix):
         (("--bits", "10", "--rate", "50", "--out", "plan.toml"), "give a key of these robots with --like"),
         (("--bits", "10", "--rate", "50", "--plot", "plan.doc"), "is no picture format"),
         (("--bits", "10", "--rate", "50", "--check", "none.csv"), "cannot read the accuracy table none.csv"),
-        (("--bits", "10", "--like", "lander.csv"), "can be read by others"),
+        (("--bits", "10", "--like", "lander.csv"), "lander.csv is no key file"),
     ],
 )
 def test_what_cannot_be_planned_is_refused_with_nothing_written(audit, folder, options, says):

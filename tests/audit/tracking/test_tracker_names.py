@@ -51,10 +51,10 @@ def audit(folder, capsys):
     return run
 
 
-def refused(answer, words):
-    """One sentence on standard error, nothing on standard output, exit code 1."""
-    code, out, err = answer
-    assert (code, out) == (1, "")
+def refused(answer, words, code=1):
+    """One sentence on standard error, nothing on standard output, and the exit code."""
+    err = answer[2]
+    assert answer[:2] == (code, "")
     assert err.startswith("mtm-audit: ")
     assert err.count("\n") == 1
     assert words in err
@@ -121,7 +121,7 @@ def test_a_region_beyond_the_picture_is_refused(audit, gray_room, name):
 )
 def test_a_bad_name_is_refused_before_the_video_is_read(audit, tmp_path, name):
     code, out, err = audit(tmp_path / "missing.mp4", "--tracker", name)
-    assert (code, out) == (1, "")
+    assert (code, out) == (2, "")
     assert err.count("\n") == 1
     assert "No such file" not in err
 
@@ -129,7 +129,7 @@ def test_a_bad_name_is_refused_before_the_video_is_read(audit, tmp_path, name):
 def test_an_unknown_tracker_is_told_all_there_are(audit, gray_room):
     answer = audit(gray_room, "--tracker", "eyes")
     for kind in ("aruco", "colour:", "brightness", "arms", "football", "flow:"):
-        refused(answer, kind)
+        refused(answer, kind, code=2)
 
 
 def clip(path, width_px, height_px, first):

@@ -8,7 +8,7 @@ from hil.experiments.attacks.registry import ATTACKS
 
 def options(tmp_path, count=1):
     return AttackOptions(names=("relay",), rollouts=count, first_seed=5, workers=1, out=tmp_path,
-                         plot=tmp_path / "a.png", cells=tmp_path / "cells.jsonl")  # fmt: skip
+                         plot=tmp_path / "a.png", force=False, cells=tmp_path / "cells.jsonl")  # fmt: skip
 
 
 def test_it_goes_on_from_the_cells_that_are_finished(tmp_path, capsys, monkeypatch):

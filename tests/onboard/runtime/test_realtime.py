@@ -86,7 +86,9 @@ def test_the_lowest_priority_is_everybody_s(system):
     thread.start()
     with realtime(RealtimeSettings(priority=1), pytest.fail) as place_threads:
         place_threads(thread)
-        assert system == [(os.SCHED_FIFO, 1)] * 2
+        # The loop's own thread and this one; libraries of other tests may have left some of theirs.
+        assert set(system) == {(os.SCHED_FIFO, 1)}
+        assert len(system) >= 2
     ended.set()
     thread.join()
 

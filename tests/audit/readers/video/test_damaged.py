@@ -60,7 +60,7 @@ def raised(kind):
 
 
 @pytest.mark.parametrize("kind", sorted(RAISED, key=lambda kind: (kind.__module__, kind.__name__)))
-@pytest.mark.parametrize("place", ["av.open", "mtm_audit.readers.video.opened._film_of"])
+@pytest.mark.parametrize("place", ["av.open", "mtm_audit.readers.video.opened.film_of"])
 def test_whatever_a_library_raises_is_one_sentence(whole, tmp_path, monkeypatch, kind, place):
     film = tmp_path / "film.mp4"
     film.write_bytes(whole["film.mp4"])

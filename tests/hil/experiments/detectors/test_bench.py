@@ -64,7 +64,7 @@ def test_a_second_run_takes_everything_from_the_cells(folder, written):
 def test_an_undrawable_picture_is_refused_before_the_work(tmp_path, capsys):
     with pytest.raises(SystemExit) as ending:
         main(["bench", "--plot", str(tmp_path / "a.doc"), "--cells", str(tmp_path / "cells.jsonl")])
-    assert ending.value.code == 1
+    assert ending.value.code == 2
     assert "no picture format" in capsys.readouterr().err
     assert not (tmp_path / "cells.jsonl").exists()
 
