@@ -82,7 +82,7 @@ def place(thread: threading.Thread) -> tuple[int, int]:
 
 def test_the_lowest_priority_is_everybody_s(system):
     ended = threading.Event()
-    thread = threading.Thread(target=ended.wait)
+    thread = threading.Thread(target=ended.wait, daemon=True)
     thread.start()
     with realtime(RealtimeSettings(priority=1), pytest.fail) as place_threads:
         place_threads(thread)
