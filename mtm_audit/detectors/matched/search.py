@@ -8,6 +8,7 @@ Signs, rotations and mirrors of the camera do not matter. All of it is done for 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -45,6 +46,7 @@ class _Candidate:
 # What all codebooks share at one coarse rate, by its number.
 _Place = Callable[[int], tuple[Heard, Grid]]
 _Report = Callable[[float], None]
+_Best = TypeVar("_Best")
 
 
 def candidate_rates(scheme: Scheme, channel: Channel, onset: Onset) -> Floats:
@@ -130,11 +132,12 @@ def _delays_and_rates(
     report: _Report,
 ) -> list[Found]:
     """Only the rate is open, and how late the robot follows: all can be weighed with one set of gains."""
-    usual, others = _by_use(rates, spacing)
-    best = _best_delays(place, usual, tones, motion, lead, report)
-    if others and not _plain([(found.evidence, coarse) for found, coarse in best], rates, spacing):
-        pairs = zip(best, _best_delays(place, others, tones, motion, lead, report), strict=True)
-        best = [max(pair, key=_found_evidence) for pair in pairs]
+    best = _usual_first(
+        rates,
+        spacing,
+        lambda some: _best_delays(place, some, tones, motion, lead, report),
+        lambda each: (each[0].evidence, each[1]),
+    )
     return [_closer(place, coarse, each, tones[number], motion, lead) for number, (each, coarse) in enumerate(best)]
 
 
@@ -154,6 +157,23 @@ def _best_delays(
         found = _surroundings(heard, grid, tones, [0] * len(tones), motion, lead, _LATER_S / motion.step_s)
         here = [(each, coarse) for each in found]
         best = here if not best else [max(pair, key=_found_evidence) for pair in zip(best, here, strict=True)]
+    return best
+
+
+def _usual_first(
+    rates: int,
+    spacing: float,
+    best_at: Callable[[Sequence[int]], list[_Best]],
+    told: Callable[[_Best], tuple[float, int]],
+) -> list[_Best]:
+    """The best of each channel at the coarse rates of usual clocks, and where one does not stand out there, at all.
+
+    `told` gives the evidence of a result and its coarse rate.
+    """
+    usual, others = _by_use(rates, spacing)
+    best = best_at(usual)
+    if others and not _plain([told(each) for each in best], rates, spacing):
+        best = [max(pair, key=lambda each: told(each)[0]) for pair in zip(best, best_at(others), strict=True)]
     return best
 
 
@@ -194,11 +214,12 @@ def _onsets_and_rates(
     lead: int,
     report: _Report,
 ) -> list[Found]:
-    usual, others = _by_use(rates, spacing)
-    best = _best_of_rates(place, usual, tones, motion, report)
-    if others and not _plain([(evidence, winner.coarse) for evidence, winner in best], rates, spacing):
-        pairs = zip(best, _best_of_rates(place, others, tones, motion, report), strict=True)
-        best = [max(pair, key=_evidence) for pair in pairs]
+    best = _usual_first(
+        rates,
+        spacing,
+        lambda some: _best_of_rates(place, some, tones, motion, report),
+        lambda each: (each[0], each[1].coarse),
+    )
     found_at: dict[int, Found] = {}
     winning = sorted({winner.coarse for _, winner in best})
     for done, coarse in enumerate(winning):
