@@ -261,6 +261,7 @@ def look(
 
 
 @app.command()
+@takes_options_of(decode, "reference", "assign", "threshold", "profile", "revoked")
 def watch(
     source: Annotated[
         str,
@@ -270,23 +271,11 @@ def watch(
             "udp://HOST:PORT.",
         ),
     ],
+    *,
     key: Annotated[Path, typer.Option(metavar="FILE", help="The key file.")],
     tracker: Annotated[
         str, typer.Option(metavar="NAME", help="How to find robots: aruco[:6x6_250], colour:NAME,... or centroid:NAME.")
     ] = "aruco",
-    reference: Annotated[
-        str,
-        typer.Option(
-            metavar="TRACK,...", help="Tracks that stand still, such as markers on the floor (default: found)."
-        ),
-    ] = "",
-    assign: Annotated[
-        list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
-    ] = None,
-    threshold: Annotated[
-        float,
-        typer.Option(metavar="P", min=1e-300, max=1.0, help="How often a message that is called decoded may be wrong."),
-    ] = 1e-4,
     seconds: Annotated[
         float | None, typer.Option(metavar="N", min=0.1, help="End after so long (default: at the verdict alone).")
     ] = None,
@@ -302,9 +291,6 @@ def watch(
             metavar="FOLDER", help="Keep what was seen in this folder, which must not exist; decode reads it."
         ),
     ] = None,
-    profile: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="What mtm-audit profile learnt about this type of robot.")
-    ] = None,
     at: Annotated[
         str | None,
         typer.Option(metavar="TIME", help="When a file was begun (2026-01-31T12:00:00Z), for a rolling schedule."),
@@ -313,16 +299,14 @@ def watch(
         float,
         typer.Option(min=0.0, max=60.0, metavar="SECONDS", help="How far this machine's clock and the source are off."),
     ] = 10.0,
-    revoked: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Key files no longer trusted, as mtm-onboard revoke lists them.")
-    ] = None,
+    **shared: Any,
 ) -> None:
     """Watch a camera, a stream or poses, and stop when a message is decoded (docs/watch.md).
 
     Exit codes: 0 decoded, 3 no message of this key, 4 inconclusive, 1 error, 2 usage. Ctrl-C ends with the best answer
     so far.
     """  # fmt: skip
-    pairs, at_unix_s = _pairs(assign or []), _unix_s(at)
+    pairs, at_unix_s = _pairs(shared["assign"] or []), _unix_s(at)
     with reported("mtm-audit", "nothing was decoded"):
         from mtm_audit.commands.opened_key import KeySource
         from mtm_audit.commands.watch import WatchOptions, run_watch
@@ -331,12 +315,14 @@ def watch(
         from mtm_onboard.protocol.revocation import RevocationList, load_revocations
 
         settings = DecodeSettings(
-            threshold=threshold, assignment=pairs, profile=None if profile is None else load_profile(profile),
-            revoked=RevocationList() if revoked is None else load_revocations(revoked),
+            threshold=shared["threshold"], assignment=pairs,
+            profile=None if shared["profile"] is None else load_profile(shared["profile"]),
+            revoked=RevocationList() if shared["revoked"] is None else load_revocations(shared["revoked"]),
         )  # fmt: skip
         code = run_watch(
             WatchOptions(
-                source=source, key=KeySource(key), tracker=tracker, reference=_names(reference), settings=settings,
+                source=source, key=KeySource(key), tracker=tracker,
+                reference=_names(shared["reference"]), settings=settings,
                 at_unix_s=at_unix_s, at_error_s=at_error, seconds=seconds, page=page, record=record,
             )
         )  # fmt: skip

@@ -10,11 +10,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress
 
+from mtm_audit.commands.console import answer_console
 from mtm_audit.commands.decode_values import check_decode_values
 from mtm_audit.commands.opened_key import KeySource, OpenedKey, opened_key
 from mtm_audit.commands.several import check_together, run_each
 from mtm_audit.commands.unused import unused_options
 from mtm_audit.decoding.decoding import Decoding
+from mtm_audit.decoding.readings import Progress as ReadingProgress
 from mtm_audit.decoding.recorded import decode_recording, recorded_of
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.decoding.together import decode_together
@@ -31,10 +33,8 @@ from mtm_audit.reporting.remarks import remarks
 from mtm_audit.reporting.report.provenance import ReportRequest
 from mtm_audit.reporting.stages import Stage, stages_of_decoding, stages_of_recording, text_of_stages
 from mtm_audit.reporting.text import print_report
-from mtm_onboard.protocol.key import Key
 from mtm_onboard.protocol.output_file import check_outputs
 
-PIPE_COLUMNS = 140
 EXIT_CODES = {"decoded": 0, "absent": 3, "inconclusive": 4}
 
 
@@ -151,7 +151,7 @@ def _decode(
     """Run the chain and tell each stage that is done; a refusal names the stage that could not go on."""
     with _progress() as progress:
         recording = _recorded(options, opened, source, stages, progress)
-        return _read(recording, opened.key, options, progress)
+        return decode_recording(recording, opened.key, options.settings, options.speed, _shown(progress))
 
 
 def _decode_together(
@@ -165,13 +165,8 @@ def _decode_together(
             if options.each_at:
                 timed = replace(options, settings=replace(options.settings, at=options.each_at[number]))
             recordings.append((timed, _recorded(timed, opened, source, stages, progress)))
-        task = progress.add_task("reading", total=1.0)
-
-        def show(stage: str, fraction: float) -> None:
-            progress.update(task, description=stage, completed=fraction)
-
         asked = [recorded_of(recording, timed.settings, timed.speed or 1.0) for timed, recording in recordings]
-        decoding, number = decode_together(asked, opened.key, show)
+        decoding, number = decode_together(asked, opened.key, _shown(progress))
     shown = recordings[number][1]
     warnings = tuple(warning for _, recording in recordings for warning in recording.warnings)
     names = tuple(source.name for source in sources)
@@ -206,21 +201,17 @@ def _recorded(
     return recording
 
 
-def _read(recording: Recording, key: Key, options: DecodeOptions, progress: Progress) -> tuple[Recording, Decoding]:
+def _shown(progress: Progress) -> ReadingProgress:
+    """Shows how far the reading is."""
     task = progress.add_task("reading", total=1.0)
-
-    def show(stage: str, fraction: float) -> None:
-        progress.update(task, description=stage, completed=fraction)
-
-    return decode_recording(recording, key, options.settings, options.speed, show)
+    return lambda stage, fraction: progress.update(task, description=stage, completed=fraction)
 
 
 def _publish(
     options: DecodeOptions, opened: OpenedKey, recording: Recording, decoding: Decoding, stages: Sequence[Stage]
 ) -> str:
     """Draw and write what is to be drawn; returns what is to be printed."""
-    key_warning = () if opened.key.warning is None else (opened.key.warning,)
-    warnings = (*remarks(recording, decoding), *key_warning)
+    warnings = (*remarks(recording, decoding), *opened.warnings)
     basis = opened.basis(recording, decoding, stated=options.settings.at is not None)
     if options.plot is not None:
         from mtm_audit.reporting.plot import draw_plot
@@ -237,9 +228,7 @@ def _publish(
         )  # fmt: skip
     if options.as_json:
         return json_report(recording, decoding, warnings, basis)
-    # In a pipe nobody sees where a line ends, and a cut table cannot be read.
-    # What users name is printed as it is: a track may be called body[left].
-    console = Console(width=None if sys.stdout.isatty() else PIPE_COLUMNS, markup=False, emoji=False)
+    console = answer_console()
     with console.capture() as captured:
         print_report(console, recording, decoding, warnings, basis)
     return captured.get()

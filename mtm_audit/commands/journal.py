@@ -5,16 +5,14 @@ import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 
+from mtm_audit.commands.console import answer_console
 from mtm_audit.reporting.journal_summary import AXES, JournalSummary, summary_of
 from mtm_onboard.protocol.journal_file import JournalHeader, read_journal
 from mtm_onboard.protocol.journal_noise import with_noise
 from mtm_onboard.protocol.key import load_key
 from mtm_onboard.protocol.output_file import check_outputs
-
-_PIPE_COLUMNS = 140
 
 
 def run_journal(path: Path, *, as_json: bool, plot: Path | None, key: Path | None = None, force: bool = False) -> None:
@@ -38,7 +36,7 @@ def run_journal(path: Path, *, as_json: bool, plot: Path | None, key: Path | Non
     if as_json:
         sys.stdout.write(json.dumps(summary.as_table(), indent=2, allow_nan=False) + "\n")
     else:
-        console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS, markup=False)
+        console = answer_console()
         console.print(_table(summary), highlight=False)
 
 

@@ -31,6 +31,11 @@ class OpenedKey:
     key: Key
     public_from: datetime | None
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader should know of the key itself."""
+        return () if self.key.warning is None else (self.key.warning,)
+
     def check_before_public(self, at: RecordedAt | None) -> None:
         """Raises MtmError, in the stage "verdict", when a film was made after the key was public."""
         if self.public_from is None or at is None or at.unix_s < self.public_from.timestamp():

@@ -1,11 +1,9 @@
 """`mtm-audit plan`: the fastest schemes for a payload, from an accuracy table."""
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
-
+from mtm_audit.commands.console import answer_console
 from mtm_audit.planning.check import check_all
 from mtm_audit.planning.plan import Plan, Problem
 from mtm_audit.planning.provision import scheme_of_plan
@@ -19,7 +17,6 @@ from mtm_onboard.protocol.output_file import check_outputs
 from mtm_onboard.protocol.scheme import Scheme
 from mtm_onboard.protocol.schemefile import save_scheme
 
-_PIPE_COLUMNS = 140
 DISAGREES = 4
 COMMAND = "mtm-audit plan"
 
@@ -62,7 +59,7 @@ def run_plan(options: PlanOptions) -> int:
         save_scheme(scheme, options.out, (f"{COMMAND}: {headline(found, options.problem, rate_hz)}",))
     print(headline(found, options.problem, rate_hz))
     # In a pipe nobody sees where a line ends, and a cut table cannot be read.
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_COLUMNS, markup=False)
+    console = answer_console()
     console.print(rich_table(found, options.problem, rate_hz), highlight=False)
     if scheme is not None:
         lines.append(f"wrote {options.out}: scheme {scheme.name} (fingerprint {scheme.fingerprint})")

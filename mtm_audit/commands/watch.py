@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from mtm_audit.commands.decode import EXIT_CODES, PIPE_COLUMNS
+from mtm_audit.commands.console import answer_console
+from mtm_audit.commands.decode import EXIT_CODES
 from mtm_audit.commands.opened_key import KeySource, OpenedKey, opened_key
 from mtm_audit.decoding.decoding import Decoding
 from mtm_audit.decoding.settings import DecodeSettings
@@ -178,10 +179,9 @@ def _report(watch: Watch, opened: OpenedKey, source: Source, answer: str) -> tup
     kind: Kind = "video" if source.is_film else "motion capture"
     recording = Recording((Path(source.shown),), kind, best.tracks, best.warnings, watch.at)
     basis = opened.basis(recording, decoding, stated=True)
-    key_warning = () if opened.key.warning is None else (opened.key.warning,)
-    console = Console(width=None if sys.stdout.isatty() else PIPE_COLUMNS, markup=False, emoji=False)
+    console = answer_console()
     with console.capture() as captured:
-        print_report(console, recording, decoding, (*remarks(recording, decoding), *key_warning), basis)
+        print_report(console, recording, decoding, (*remarks(recording, decoding), *opened.warnings), basis)
     return captured.get() + _looks_sentence(watch, best) + "\n", EXIT_CODES[decoding.verdict]
 
 
