@@ -2,6 +2,8 @@
 
 Each stage begins at rest and keeps its state, so that a run may be passed through it whole or step by step with the
 same result. `advance` takes the demand (n, axes) of the next n steps and returns what is followed, (n, axes).
+
+scipy.signal, which takes half a second to import, is imported where a linear filter is used: most robots have none.
 """
 
 from collections.abc import Sequence
@@ -9,7 +11,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 Floats = NDArray[np.float64]
 
@@ -82,6 +83,8 @@ class Filter:
 
     def advance(self, demand: Floats) -> Floats:
         """What becomes of the demand of the next steps."""
+        from scipy import signal
+
         numerator, denominator = self._coefficients
         order = max(len(numerator), len(denominator)) - 1
         state = np.zeros((order, demand.shape[1])) if self._state is None else self._state
@@ -97,12 +100,16 @@ def lag(step_s: float, lag_s: float) -> Filter:
 
 def oscillator(step_s: float, natural_hz: float, damping: float) -> Filter:
     """An oscillator of that natural frequency and damping ratio, as a multicopter's attitude loop gives."""
+    from scipy import signal
+
     turn = 2.0 * np.pi * natural_hz
     return Filter(*signal.bilinear([turn**2], [1.0, 2.0 * damping * turn, turn**2], 1.0 / step_s))
 
 
 def notch(step_s: float, notch_hz: float, quality: float) -> Filter:
     """A notch filter, as it is put into a command path against a resonance of the structure."""
+    from scipy import signal
+
     return Filter(*signal.iirnotch(notch_hz, quality, fs=1.0 / step_s))
 
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from hil.sensors.poses import Floats
 from mtm_onboard.protocol.errors import MtmError
@@ -48,7 +48,8 @@ class Optics:
         cos, sin = np.cos(self.roll_rad), np.sin(self.roll_rad)
         aimed = np.stack([cos * right + sin * down, cos * down - sin * right, forward])
         pan, tilt, roll = self.turn_rad
-        return np.asarray(Rotation.from_rotvec([tilt, -pan, -roll]).as_matrix() @ aimed)
+        turned, _ = cv2.Rodrigues(np.array([tilt, -pan, -roll]))
+        return np.asarray(turned @ aimed)
 
     def project(self, points_m: Floats) -> Floats:
         """Pixels (n, 2) of world points (n, 3), which must lie in front of the camera."""
