@@ -11,7 +11,7 @@ PYTEST :=
 # The build without CUDA where the index offers it under this number.
 TORCH := torch==2.13.0
 
-.PHONY: setup demo site test test-audit test-others test-realtime test-all test-long test-oldest explore coverage lint peers bench mutants firmware \
+.PHONY: setup demo site test test-audit test-others test-realtime test-slow test-all test-long test-oldest explore coverage lint peers bench mutants firmware \
   firmware-mutants deb deb-test dist constraints clean
 
 # $(call install,folder,file): the packages that a file of constraints/ names, by hash, and the project itself.
@@ -41,16 +41,20 @@ test: setup lint
 	@$(MAKE) --no-print-directory test-realtime
 
 test-audit: setup
-	$(BIN)/pytest -m "not long and not peer and not realtime" $(PYTEST) tests/audit
+	$(BIN)/pytest -m "not slow and not long and not peer and not realtime" $(PYTEST) tests/audit
 
 test-others: setup
-	$(BIN)/pytest -m "not long and not peer and not realtime" $(PYTEST) --ignore=tests/audit tests
+	$(BIN)/pytest -m "not slow and not long and not peer and not realtime" $(PYTEST) --ignore=tests/audit tests
 
 test-realtime: setup
-	$(BIN)/pytest -m "realtime and not long and not peer" $(PYTEST) tests
+	$(BIN)/pytest -m "realtime and not slow and not long and not peer" $(PYTEST) tests
+
+# Whole films, tables and searches of ten seconds and more each; they need nothing that `make test` does not.
+test-slow: setup
+	$(BIN)/pytest -m "slow and not long and not peer" $(PYTEST)
 
 # Everything: what `make test` runs, and then the rest.
-test-all: test test-long test-oldest mutants firmware firmware-mutants peers site
+test-all: test test-slow test-long test-oldest mutants firmware firmware-mutants peers site
 
 # VMAS's worlds, the C compilers and the emulator, and the wheel in clean environments.
 test-long: $(VENV)/.worlds

@@ -34,6 +34,8 @@ COPIES = (
     Copy(suffix="avi", codec="mjpeg", options=MJPEG, pixel_format="yuvj420p"),
 )
 H264 = COPIES[1]
+# One with motion between pictures and one of pictures alone stand for the others where time is short.
+QUICK = COPIES[0], COPIES[-1]
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +66,13 @@ def audit(folder, capsys):
     return run
 
 
-@pytest.mark.parametrize("copy", COPIES, ids=lambda copy: f"{copy.codec} in {copy.suffix}")
+@pytest.mark.parametrize(
+    "copy",
+    [
+        pytest.param(copy, id=f"{copy.codec} in {copy.suffix}", marks=() if copy in QUICK else pytest.mark.slow)
+        for copy in COPIES
+    ],
+)
 def test_a_copy_in_another_codec_says_the_same(folder, tmp_path, whole, copy):
     copied = decode(transcode(folder / "film.mp4", tmp_path / f"copy.{copy.suffix}", copy), KEY)
     assert (copied.verdict, copied.message) == (whole.verdict, whole.message) == ("decoded", MESSAGE)
@@ -105,6 +113,7 @@ def test_a_known_frame_rate_is_decoded(audit, slow):
     assert (code, out.splitlines()[0].split(" (")[0]) == (0, f"decoded: message {MESSAGE}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("speed", "every"), [(4.0, 4), (2 / 3, 1)])
 def test_a_searched_speed_is_found_and_paid_for(audit, folder, tmp_path, speed, every):
     film = transcode(folder / "film.mp4", tmp_path / "film.mkv", H264, speed=speed, every=every)
@@ -117,6 +126,7 @@ def test_a_searched_speed_is_found_and_paid_for(audit, folder, tmp_path, speed, 
     assert len(SPEEDS) == 15
 
 
+@pytest.mark.slow
 def test_a_coarse_film_without_a_message_stays_absent(audit, tmp_path):
     # What an encoder leaves of noise is red: most of it lies below 1 Hz, and some of it repeats.
     film = film_robots(tmp_path / "film.mp4", crf=30, symbols=None)
@@ -138,6 +148,7 @@ def test_two_frames_a_second_are_too_few_in_one_sentence(audit, folder, tmp_path
         assert err.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_date_means_the_first_frame_whatever_its_stamp(tmp_path, capsys):
     key = key_of(scheme_of(symbols=(1, 1), ticks=200, schedule="rolling"))
     save_key(key, tmp_path / "rolling.key")
@@ -160,6 +171,7 @@ def test_a_folder_of_pictures_with_a_rate_is_decoded(audit, folder, tmp_path):
     assert (code, out.splitlines()[0].split(" (")[0]) == (0, f"decoded: message {MESSAGE}")
 
 
+@pytest.mark.slow
 def test_several_films_are_decoded_one_after_the_other(audit, folder, tmp_path):
     shutil.copy(folder / "film.mp4", tmp_path / "one.mp4")
     shutil.copy(folder / "film.mp4", tmp_path / "two.mp4")

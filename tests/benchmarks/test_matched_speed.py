@@ -83,6 +83,7 @@ def test_a_minute_of_4096_symbols_is_5_times_real_time(benchmark, capsys):
         assert SECONDS / taken_s >= 5.0
 
 
+@pytest.mark.slow
 def test_a_verdict_s_decoys_cost_what_they_cost(benchmark, capsys):
     taken_s = measured(benchmark, recording(256), decoys=DECOYS, rounds=1)
     if taken_s is not None:

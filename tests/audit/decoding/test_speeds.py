@@ -97,6 +97,7 @@ def test_the_search_finds_the_speed(tracks, decoding, speed):
     assert decoded.evidence.bits == pytest.approx(decoding.evidence.bits - math.log2(len(SPEEDS)), abs=1.0)
 
 
+@pytest.mark.slow
 def test_the_search_finds_nothing_for_a_key_that_had_no_part(tracks):
     said = []
     _, decoded = decode_at_speeds(tracks, key_of(KEY.scheme, OTHER_SECRET), SETTINGS, lambda *step: said.append(step))

@@ -90,6 +90,7 @@ def test_a_speck_is_found_in_the_end():
     assert track.valid[-10:].all()
 
 
+@pytest.mark.slow
 def test_looking_for_a_lost_colour_costs_little():
     """In calls, not in seconds: how many pixels are looked at in all."""
     looked = []

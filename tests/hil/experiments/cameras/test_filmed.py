@@ -1,5 +1,7 @@
 from dataclasses import asdict
 
+import pytest
+
 from hil.experiments.cameras.filmed import ANGLE, CONDITIONS, STILL, Condition, camera_cells, film_and_decode, rows_of
 
 
@@ -27,6 +29,7 @@ def test_shares_of_angles_are_of_the_best_angle():
     assert (shares[0], shares[-1]) == (1.0, 0.55)
 
 
+@pytest.mark.slow
 def test_a_shaking_camera_keeps_most_of_the_evidence():
     still, shaken = (
         film_and_decode(asdict(condition), 900_001)

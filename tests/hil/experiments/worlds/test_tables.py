@@ -25,6 +25,7 @@ def quick_table(tmp_path_factory):
     return table_of(out), cells
 
 
+@pytest.mark.slow
 def test_a_quick_look_at_the_lander_reads_the_headline(quick_table):
     table, _ = quick_table
     for detector in ("coherency", "matched"):
@@ -36,6 +37,7 @@ def test_a_quick_look_at_the_lander_reads_the_headline(quick_table):
         assert int(row["messages_correct"]) >= 7
 
 
+@pytest.mark.slow
 def test_a_video_file_in_between_changes_no_message(quick_table):
     table, _ = quick_table
     for detector in ("coherency", "matched"):
@@ -46,6 +48,7 @@ def test_a_video_file_in_between_changes_no_message(quick_table):
         assert right["from a file"] == right["message"]
 
 
+@pytest.mark.slow
 def test_wrong_keys_and_silence_read_no_more_than_chance(quick_table):
     table, _ = quick_table
     for row in table:
@@ -53,6 +56,7 @@ def test_wrong_keys_and_silence_read_no_more_than_chance(quick_table):
             assert float(row["symbol_percent_low"]) <= 12.5 <= float(row["symbol_percent_high"])
 
 
+@pytest.mark.slow
 def test_a_second_look_computes_nothing_again(quick_table, tmp_path, monkeypatch):
     table, cells = quick_table
     before = cells.read_bytes()
