@@ -25,7 +25,7 @@ def main() -> None:
             continue
         shutil.rmtree(PEERS / group, ignore_errors=True)
         try:
-            (install_node if group == "node" else install_python)(PEERS / group, requirements)
+            INSTALLERS.get(group, install_python)(PEERS / group, requirements)
         except (OSError, subprocess.SubprocessError) as error:
             reason.write_text(because(error), encoding="utf-8")
             print(f"{group}: not installed, {because(error)}")
@@ -47,6 +47,15 @@ def install_node(folder: Path, requirements: Path) -> None:
     run("npm", "install", "--silent", "--no-fund", "--no-audit", "--prefix", folder, *requirements.read_text().split())
 
 
+def unpack_dji(folder: Path, requirements: Path) -> None:
+    """DJI's package, whose one wheel is for Python 3.8; its codec is pure Python and needs nothing else."""
+    run(
+        sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-compile",
+        "--only-binary", ":all:", "--python-version", "3.8", "--implementation", "cp", "--abi", "cp38",
+        "--platform", "manylinux2014_x86_64", "--target", folder, "-r", requirements,
+    )  # fmt: skip
+
+
 def run(*command: object) -> None:
     """Run a command and raise what it said last when it fails."""
     subprocess.run(
@@ -59,6 +68,8 @@ def because(error: OSError | subprocess.SubprocessError) -> str:
     said = (getattr(error, "stderr", None) or b"").decode(errors="replace").strip().splitlines()
     return said[-1] if said else str(error)
 
+
+INSTALLERS = {"node": install_node, "dji": unpack_dji}
 
 if __name__ == "__main__":
     main()
