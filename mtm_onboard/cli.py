@@ -37,8 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
 
 
-def parser_of() -> Parser:
-    """The command line of all commands."""
+def parser_of(word: str = "") -> Parser:
+    """The command line of all commands; where `word` is one of them, of that one, so that no other is imported."""
     parser = Parser(prog="mtm-onboard", description=import_module("mtm_onboard").__doc__)
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     parser.add_argument(
@@ -49,11 +49,15 @@ def parser_of() -> Parser:
         help="print what completes commands in a shell",
     )
     subparsers = parser.add_subparsers(metavar="COMMAND", title="Commands", parser_class=Parser)
-    for command in _COMMANDS:
+    for command in [command for command in _COMMANDS if _word_of(command) == word] or _COMMANDS:
         import_module(command).add_parser(subparsers)
     for own in subparsers.choices.values():
         own.set_defaults(parser=own)
     return parser
+
+
+def _word_of(command: str) -> str:
+    return command.rpartition(".")[2].replace("_", "-")
 
 
 class _Version(argparse.Action):
@@ -74,8 +78,9 @@ class _Completion(argparse.Action):
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    parser = parser_of()
-    args = parser.parse_args(arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    parser = parser_of(words[0] if words else "")
+    args = parser.parse_args(words)
     if "handler" not in args:
         print(parser.format_help(), end="", file=sys.stderr)
         return 2

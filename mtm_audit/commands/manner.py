@@ -1,6 +1,5 @@
 """What the typed command lines have in common: how help and the version are asked for."""
 
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import typer
@@ -21,6 +20,9 @@ def version_option(program: str) -> Any:
 
 def _installed_version() -> str:
     """As `mtm_onboard.protocol.installing.program_version`, without numpy, which comes with all of the protocol."""
+    # Takes as long to import as the help takes to print.
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return version("messages-through-motion")
     except PackageNotFoundError:

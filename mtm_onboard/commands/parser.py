@@ -1,7 +1,6 @@
 """The command line's own parser: help and refusals that look like those of the two other programs."""
 
 import argparse
-import difflib
 import sys
 from typing import Any, Never
 
@@ -65,7 +64,7 @@ class Parser(argparse.ArgumentParser):
 
     def _refuse_option(self, word: str) -> Never:
         name = word.partition("=")[0]
-        near = sorted(difflib.get_close_matches(name, self._option_string_actions))
+        near = sorted(_near(name, list(self._option_string_actions)))
         self.error(f"No such option: {name}" + (f" (Possible options: {', '.join(near)})" if near else ""))
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
@@ -73,7 +72,7 @@ class Parser(argparse.ArgumentParser):
         if choices is None or value in choices:
             return
         if isinstance(action, argparse._SubParsersAction):
-            near = difflib.get_close_matches(value, choices)
+            near = _near(value, choices)
             meant = f" Did you mean {', '.join(repr(name) for name in near)}?" if near else ""
             self.error(f"No such command {value!r}.{meant}")
         self.error(f"Invalid value for {_named(action)}: {value!r} is not one of {', '.join(choices)}.")
@@ -111,6 +110,13 @@ class Formatter(argparse.HelpFormatter):
         ended = text if text.endswith((".", ")")) else f"{text}."
         required = " [required]" if action.required and action.option_strings else ""
         return f"{begins}{ended[1:]}{required}"
+
+
+def _near(word: str, known: list[str]) -> list[str]:
+    # Imported for mistakes alone: it takes as long as half of a command's own modules.
+    from difflib import get_close_matches
+
+    return get_close_matches(word, known)
 
 
 def _named(action: argparse.Action) -> str:

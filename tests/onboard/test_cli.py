@@ -1,3 +1,4 @@
+import argparse
 import re
 import select
 import signal
@@ -10,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mtm_onboard.cli import main
+from mtm_onboard.cli import main, parser_of
 from mtm_onboard.journal.journal import read_journal
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import load_key
@@ -20,6 +21,12 @@ from mtm_onboard.runtime.client import BaseCommandClient
 from mtm_onboard.runtime.guard import NOISE
 from mtm_onboard.runtime.modulator import Modulator
 from tests.patience import PATIENCE_S
+
+
+def choices_of(parser):
+    """The commands that a parser knows."""
+    return next(action.choices for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+
 
 CONFIG = """
 [robot]
@@ -306,6 +313,12 @@ def test_a_full_disk_and_an_interrupt_get_one_sentence(key, capsys, monkeypatch,
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert says in error
+
+
+def test_a_command_is_parsed_without_importing_the_others():
+    every = list(choices_of(parser_of()))
+    assert {word: list(choices_of(parser_of(word))) for word in every} == {word: [word] for word in every}
+    assert list(choices_of(parser_of("runn"))) == every
 
 
 def test_help_loads_nothing_that_it_does_not_need():
