@@ -18,7 +18,7 @@ from mtm_audit.batch.processes import SINGLE_THREADED
 from mtm_onboard.protocol import MtmError
 
 MESSAGE = 0b10110010
-SECONDS = 12
+SECONDS = 14
 PLOT, REPORT, STILL = "decode.png", "report.html", "overlay.png"
 _AT_ONCE = 2
 _VERDICT_CODES = (0, 3, 4)
