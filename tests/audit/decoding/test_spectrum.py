@@ -10,7 +10,7 @@ from mtm_audit.decoding.settings import DecodeSettings
 from tests.audit.moving_robot import FAKE_SECRET, OTHER_SECRET, key_of, robot_track, scheme_of
 
 # A slope over the band, and a band with a faint floor beside it.
-SLOPE = ((0.5, 0.0), (5.0, -12.0))
+SLOPE = ((0.5, 0.0), (5.0, -6.0))
 FLOOR = ((0.9, -10.0), (1.0, 0.0), (3.0, 0.0), (3.1, -10.0))
 SENT, ONSET_S = (5,), 0.6
 
