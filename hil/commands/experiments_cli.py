@@ -46,6 +46,9 @@ def bench(
         typer.Option(metavar="NAMES", help="Other robots instead: all, or names and plant files parted by commas."),
     ] = None,
     ticks: Annotated[int, typer.Option(metavar="TICKS", min=10, help="With --plants: window of a symbol.")] = 100,
+    spectra: Annotated[
+        bool, typer.Option("--spectra", help="What the noise's spectrum is worth at 6 bits/s instead.")
+    ] = False,
     out: OutCsv = None,
     force: Force = False,
     plot: Annotated[
@@ -54,6 +57,10 @@ def bench(
     cells: Cells = CELLS_FOLDER / "bench.jsonl",
 ) -> None:
     """Compare the paper's detector and ours with the genie, an oracle, on the same recordings."""
+    if spectra and (quick or plot is not None or plants is not None):
+        raise typer.BadParameter(
+            "--spectra has one table of its own; leave out --quick, --plot and --plants", param_hint="--spectra"
+        )
     if plants is not None and (quick or plot is not None):
         raise typer.BadParameter("--quick and --plot do not go with --plants; take fewer --rollouts for a first look")
     with reported_console("mtm-hil bench", out, plot, force=force) as console:
@@ -64,6 +71,11 @@ def bench(
             job = PlantJob(ticks=ticks)
             asked = PlantsOptions(plants=plants, job=job, rollouts=rollouts, out=out, cells=cells)
             bench_plants(asked, console)
+            return
+        if spectra:
+            from hil.commands.bench_spectra import SpectraOptions, bench_spectra
+
+            bench_spectra(SpectraOptions(rollouts, out, cells), console)
             return
         from hil.commands.bench import BenchOptions
         from hil.commands.bench import bench as run

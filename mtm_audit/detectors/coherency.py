@@ -1,5 +1,7 @@
 """The paper's detector: mean magnitude of Welch coherency over the band, maximised over 101 rates, pooled over axes.
 
+Under a spectrum, which the paper does not have, each frequency counts in proportion to its power.
+
 Appendix "Detection Pipeline Details" of the paper: Hann window, nperseg = min(128, L / 2), three quarters overlap,
 nfft = L, L being the window in ticks; the glimpse is resampled at each candidate rate.
 """
@@ -67,7 +69,8 @@ class CoherencyDetector:
             return self._score_group(codebooks, [timing] * len(codebooks), channel, axes, searched=False)
         rates_hz = scheme.rate_hz * RATE_SCALES
         band = np.array(scheme.band_hz) / scheme.rate_hz
-        plan = plan_onset_search(axes, rates_hz, band, ticks)
+        spectrum = scheme.spectrum and tuple((hz / scheme.rate_hz, level_db) for hz, level_db in scheme.spectrum)
+        plan = plan_onset_search(axes, rates_hz, band, ticks, spectrum)
         if isinstance(onset, OnsetRange):
             # At the fastest rate the most windows fit between the earliest onset and the recording's end.
             numbered = int(np.ceil((glimpse.edges_s[-1] - onset.low_s) * rates_hz[-1] / ticks))
@@ -145,7 +148,8 @@ def rate_searched_scores(
 ) -> Floats:
     """The paper's score of each candidate in one window: best mean coherency over the 101 rates, shape (M,)."""
     observed = _observed_spectra(own_axes(channel, glimpse), codebook, channel, onset_s, window)
-    best: Floats = mean_coherency(_reference_spectra([codebook], channel, window)[0], observed).max(axis=1)
+    references = _reference_spectra([codebook], channel, window)[0]
+    best: Floats = mean_coherency(references, observed, _powers(codebook, channel)).max(axis=1)
     return best
 
 
@@ -165,13 +169,14 @@ def _read_at(
     count, size = len(codebooks), scheme.alphabet_size
     scores = np.empty((count, len(windows), size))
     references: list[Complexes] | None = None
+    powers = _powers(codebooks[0], channel)
     for row, window in enumerate(windows):
         if references is None or scheme.schedule == "rolling":
             references = _reference_spectra(codebooks, channel, int(window))
         # Rates scale the time since the onset, so the search stays the paper's however late the window is.
         observed = _observed_spectra(glimpse, codebooks[0], channel, timing.onset_s, int(window))
         for number, reference in enumerate(references):
-            scores[number, row] = mean_coherency(reference, observed).max(axis=1)
+            scores[number, row] = mean_coherency(reference, observed, powers).max(axis=1)
     starts_s = timing.onset_s + windows * ticks / timing.rate_hz
     return [_reading(timing, scores[number], windows, starts_s, channel.symbols) for number in range(count)]
 
@@ -182,6 +187,11 @@ def _reading(timing: Timing, scores: Floats, numbers: NDArray[np.int64], starts_
     seen = np.isin(np.arange(symbols), positions)
     strength = float(combined[seen].max(axis=1).mean())
     return Reading(timing, combined, scores, numbers, positions, starts_s, strength)
+
+
+def _powers(codebook: Codebook, channel: Channel) -> Floats | None:
+    """What each bin counts, (K,) of mean 1; None where all count alike, as in the paper."""
+    return None if codebook.scheme.spectrum is None else codebook.tone_powers(channel)
 
 
 def _reference_spectra(codebooks: Sequence[Codebook], channel: Channel, window: int) -> list[Complexes]:

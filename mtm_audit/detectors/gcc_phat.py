@@ -9,6 +9,7 @@ from scipy import fft
 from mtm_audit.model.glimpse import Glimpse, tick_velocities
 from mtm_audit.model.timing import OnsetRange, Timing
 from mtm_audit.model.track import Floats
+from mtm_onboard.protocol.spectrum import Points, tone_powers
 
 # The paper's grid of candidate policy rates: 101 over +-20 %.
 RATE_SCALES: Floats = np.linspace(0.8, 1.2, 101)
@@ -18,9 +19,10 @@ RATE_SCALES: Floats = np.linspace(0.8, 1.2, 101)
 class PhatPlan:
     """What the onset search needs of a glimpse, whatever the candidate waveforms are.
 
-    `phases` (rates, axes, frequencies): unit-magnitude spectra of the tick velocities at each candidate rate, zero
-    outside the band; `ticks` (rates,) the recording's length in control periods, at least one; `transform_ticks` the
-    length of the transforms. Single precision: only the place of a peak is read from them.
+    `phases` (rates, axes, frequencies): unit-magnitude spectra of the tick velocities at each candidate rate, each
+    frequency times what it counts, which is nothing outside the band; `ticks` (rates,) the recording's length in
+    control periods, at least one; `transform_ticks` the length of the transforms. Single precision: only the place of a
+    peak is read from them.
     """
 
     first_s: float
@@ -30,20 +32,26 @@ class PhatPlan:
     phases: NDArray[np.complex64]
 
 
-def plan_onset_search(glimpse: Glimpse, rates_hz: Floats, band_of_rate: Floats, window_ticks: int) -> PhatPlan:
+def plan_onset_search(
+    glimpse: Glimpse, rates_hz: Floats, band_of_rate: Floats, window_ticks: int, spectrum: Points | None = None
+) -> PhatPlan:
     """Prepare a generalised cross-correlation with phase transform (GCC-PHAT) at each candidate rate.
 
-    `band_of_rate` is (low, high) as fractions of the rate.
+    `band_of_rate` is (low, high) as fractions of the rate, as are the frequencies of the `spectrum`, in proportion to
+    whose power those of the band count; without one all count alike.
     """
     first_s, last_s = float(glimpse.edges_s[0]), float(glimpse.edges_s[-1])
     ticks = np.maximum(1, np.floor((last_s - first_s) * rates_hz + 1e-6).astype(np.int64))
     transform_ticks = fft.next_fast_len(int(ticks.max()) + window_ticks, real=True)
     frequencies = np.fft.rfftfreq(transform_ticks)
     inside = (frequencies >= band_of_rate[0]) & (frequencies <= band_of_rate[1])
+    counted = inside.astype(np.float64)
+    if spectrum is not None:
+        counted[inside] = tone_powers(spectrum, frequencies[inside])
     phases = np.zeros((len(rates_hz), glimpse.velocities.shape[1], len(frequencies)), dtype=np.complex64)
     for row, (rate_hz, count) in enumerate(zip(rates_hz, ticks, strict=True)):
         velocities = tick_velocities(glimpse, first_s, float(rate_hz), int(count))
-        phases[row] = _unit(fft.rfft(velocities - velocities.mean(axis=0), transform_ticks, axis=0).T) * inside
+        phases[row] = _unit(fft.rfft(velocities - velocities.mean(axis=0), transform_ticks, axis=0).T) * counted
     return PhatPlan(first_s, rates_hz, ticks, transform_ticks, phases)
 
 

@@ -47,10 +47,11 @@ def segment_spectra(signals: Floats, bins: NDArray[np.int64]) -> Complexes:
     return spectra
 
 
-def mean_coherency(candidates: Complexes, observed: Complexes) -> Floats:
+def mean_coherency(candidates: Complexes, observed: Complexes, powers: Floats | None = None) -> Floats:
     """Mean magnitude of coherency over axes and bins, every candidate with every observation.
 
-    `candidates` (C, axes, bins, segments), `observed` (R, axes, bins, segments); result (C, R).
+    `candidates` (C, axes, bins, segments), `observed` (R, axes, bins, segments); result (C, R). With `powers` (bins,)
+    of mean 1 each bin counts in proportion to its own.
     """
     count, axes, bins, segments = candidates.shape
     left = np.ascontiguousarray(candidates.conj().reshape(count, axes * bins, segments).transpose(1, 0, 2))
@@ -58,5 +59,8 @@ def mean_coherency(candidates: Complexes, observed: Complexes) -> Floats:
     result = np.empty((count, len(observed)))
     step = max(1, _CHUNK_VALUES // (axes * bins * max(1, len(observed))))
     for start in range(0, count, step):
-        result[start : start + step] = np.abs(left[:, start : start + step] @ right).mean(axis=0)
+        magnitudes = np.abs(left[:, start : start + step] @ right)
+        if powers is not None:
+            magnitudes *= np.tile(powers, axes)[:, None, None]
+        result[start : start + step] = magnitudes.mean(axis=0)
     return result

@@ -4,6 +4,7 @@ import numpy as np
 
 from mtm_audit.model.recording import Recording
 from mtm_onboard.protocol.scheme import Channel, Scheme
+from mtm_onboard.protocol.waveform import channel_tones
 
 _MARKER_M = 0.1
 # A marker must be this wide to be read at all.
@@ -39,7 +40,10 @@ def film_limits(recording: Recording, scheme: Scheme) -> tuple[str, ...]:
 def displacement_m(channel: Channel, scheme: Scheme) -> float:
     """Root mean square displacement along one axis that a channel's noise commands, in metres.
 
-    Its tones have equal mean power, so the mean square is sigma^2 times the mean of 1 / (2 pi f)^2 over the band.
+    The mean square is sigma^2 times the mean of 1 / (2 pi f)^2 over the band, where each tone counts by its power.
     """
+    if scheme.spectrum is not None:
+        tones_hz, powers = channel_tones(scheme, channel)
+        return float(channel.sigma * np.sqrt(np.mean(powers / (2.0 * np.pi * tones_hz) ** 2)))
     low_hz, high_hz = scheme.band_hz
     return float(channel.sigma / (2.0 * np.pi * np.sqrt(low_hz * high_hz)))

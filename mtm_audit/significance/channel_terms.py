@@ -10,7 +10,7 @@ from mtm_audit.detectors.base import ChannelReading
 from mtm_audit.detectors.matched.correlate import Prepared, stacked_tones
 from mtm_audit.detectors.matched.evidence import log_sum_exp
 from mtm_audit.detectors.matched.plants import Plants, joined, plant_family, returning, second_order
-from mtm_audit.detectors.matched.projections import Places, Projections, project
+from mtm_audit.detectors.matched.projections import Places, Projections, project, shaped
 from mtm_audit.model.timing import Onset, Timing
 from mtm_audit.model.track import Floats
 from mtm_audit.significance.gains import Levels, all_levels, orientations
@@ -41,9 +41,10 @@ class ChannelTerms:
 
     `groups` (windows,) numbers the windows that are played from one waveform, `positions` (groups,) says which message
     position each carries. `candidates` (shown positions, k) are the symbols that are looked at, those that score best;
-    `tones` (groups, k, injected axes, 2 K) theirs. `shared` when one codebook serves all positions (fixed schedule).
-    `timing` is what all channels together found; `alone` and `strength` are what this one found by itself. Channels of
-    one `name` are parts of one, which carry the same symbols on different axes.
+    `tones` (groups, k, injected axes, 2 K) theirs, without the spectrum's `powers` (K,): these count as part of the
+    response, so that tones follow the law whose mean is known in closed form. `shared` when one codebook serves all
+    positions (fixed schedule). `timing` is what all channels together found; `alone` and `strength` are what this one
+    found by itself. Channels of one `name` are parts of one, which carry the same symbols on different axes.
     """
 
     name: str
@@ -56,6 +57,7 @@ class ChannelTerms:
     candidates: Integers
     tones: Floats
     tones_hz: Floats
+    powers: Floats
     law: Power
     alphabet_size: int
     shared: bool
@@ -202,7 +204,7 @@ def channel_terms(
         stacked_tones(codebook, channel, int(number), candidates[row].tolist())
         for number, row in zip(played, np.arange(len(shown)) if shared else rows, strict=True)
     ]
-    ticks = scheme.window_ticks(channel)
+    ticks, powers = scheme.window_ticks(channel), codebook.tone_powers(channel)
     return ChannelTerms(
         name=channel.name,
         prepared=reading.prepared,
@@ -220,8 +222,9 @@ def channel_terms(
         groups=groups,
         positions=positions + (0 if apart else scheme.first_position(channel)),
         candidates=candidates,
-        tones=np.stack(tones).astype(np.float64),
+        tones=np.stack(tones).astype(np.float64) / np.sqrt(np.concatenate([powers, powers])),
         tones_hz=codebook.bins(channel) * (found.timing.rate_hz / ticks),
+        powers=powers,
         law=scheme.power,
         alphabet_size=scheme.alphabet_size,
         shared=shared,
@@ -234,7 +237,7 @@ def _terms_at(channel: ChannelTerms, timing: Timing) -> Terms:
     near = neighbourhood(channel.span, timing, channel.onset)
     length_s = channel.span.window_ticks / timing.rate_hz
     places = Places(near.starts_s, channel.groups, SHAPES, length_s, channel.tones_hz)
-    projections = project(channel.prepared, places)
+    projections = shaped(project(channel.prepared, places), channel.powers)
     timings, plants = (
         grid.ravel()
         for grid in np.meshgrid(np.arange(len(near.log_priors)), np.arange(len(SHAPES.taps)), indexing="ij")

@@ -2,6 +2,7 @@
 
 A candidate's tones on one axis are a vector t of d = 2 K real numbers, the real and imaginary parts of K tones. Over
 keys it is normal with variance 1 / K (`power = "ensemble"`) or uniform on the sphere |t|^2 = 2 (`power = "window"`).
+A spectrum multiplies t by fixed factors, which are moved into the weights beforehand (`channel_terms`).
 Both functions return log E exp(u . t - sum_k q_k t_k^2 / 2) for weights u of any sign and q >= 0.
 """
 

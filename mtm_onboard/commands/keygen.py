@@ -42,6 +42,7 @@ _PRESETS: dict[str, dict[str, Any]] = {
 _USUAL_DAYS = 3653
 _REQUIRED = ("name", "rate", "band", "alphabet", "message_ticks", "channel")
 _CHOSEN_BY_SCHEME = ("combine", "pooling", "power", "schedule", "epoch")
+_FLAT = "flat"
 # Widths of a tag, the first that fits being taken where none is asked for.
 _TAG_BITS = (32, 24, 16)
 _FRAMING = ("payload", "number_bits", "check", "code", "interleave")
@@ -77,6 +78,12 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--power",
         metavar="window|ensemble",
         help="window (default): each window has mean square 1; ensemble: Gaussian samples",
+    )
+    parser.add_argument(
+        "--spectrum",
+        type=_points,
+        metavar="HZ:DB,HZ:DB",
+        help="power over the band by points, such as 0.5:0,5:-6, or flat (default); the total stays the same",
     )
     parser.add_argument(
         "--schedule",
@@ -115,7 +122,7 @@ def _keygen(args: argparse.Namespace) -> int:
     from mtm_onboard.protocol.key import generate_master
     from mtm_onboard.protocol.schemefile import load_scheme
 
-    given = {name: getattr(args, name) for name in (*_REQUIRED, *_CHOSEN_BY_SCHEME, *_FRAMING)}
+    given = {name: getattr(args, name) for name in (*_REQUIRED, *_CHOSEN_BY_SCHEME, "spectrum", *_FRAMING)}
     if args.scheme is None:
         with command_line_values():
             scheme = _chosen_scheme(args, given)
@@ -151,6 +158,7 @@ def _chosen_scheme(args: argparse.Namespace, given: dict[str, Any]) -> "Scheme":
     scheme = Scheme(
         name=chosen["name"], rate_hz=chosen["rate"], band_hz=chosen["band"], alphabet_size=chosen["alphabet"],
         message_ticks=chosen["message_ticks"], channels=tuple(_channel(text) for text in chosen["channel"]),
+        spectrum=chosen.get("spectrum") or None,
         **{name: chosen[name] for name in _CHOSEN_BY_SCHEME if name in chosen},
     )  # fmt: skip
     asked = {name: chosen[name] for name in _FRAMING if name in chosen}
@@ -202,6 +210,14 @@ def _sized(text: str) -> tuple[str, int]:
 def _band(text: str) -> tuple[float, float]:
     low, high = text.split(":")
     return float(low), float(high)
+
+
+def _points(text: str) -> tuple[tuple[float, float], ...]:
+    """The points of a spectrum; none at all for a flat one."""
+    if text == _FLAT:
+        return ()
+    pairs = [part.split(":") for part in text.split(",")]
+    return tuple((float(frequency), float(level)) for frequency, level in pairs)
 
 
 def _channel(text: str) -> "Channel":

@@ -35,6 +35,7 @@ def _lines(key: "Key") -> list[str]:
         f"fingerprint   {scheme.fingerprint}",
         f"rate          {scheme.rate_hz:g} Hz",
         f"band          {low_hz:g} to {high_hz:g} Hz",
+        f"spectrum      {_spectrum_text(scheme)}",
         f"alphabet      {scheme.alphabet_size} symbols",
         f"message       {scheme.message_ticks} ticks, {duration_s:g} s, {scheme.message_symbols} symbols",
         *_frame_lines(scheme),
@@ -49,6 +50,14 @@ def _lines(key: "Key") -> list[str]:
             f"sigma {channel.sigma:g}"
         )
     return lines
+
+
+def _spectrum_text(scheme: "Scheme") -> str:
+    """Levels beside the loudest."""
+    if scheme.spectrum is None:
+        return "flat"
+    top_db = max(level_db for _, level_db in scheme.spectrum)
+    return ", ".join(f"{level_db - top_db:.3g} dB at {hz:g} Hz" for hz, level_db in scheme.spectrum)
 
 
 def _grant_lines(key: "Key") -> list[str]:

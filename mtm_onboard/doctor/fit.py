@@ -2,9 +2,12 @@
 
 import math
 
+import numpy as np
+
 from mtm_onboard.doctor.finding import Finding
 from mtm_onboard.model.velocity import AXES
 from mtm_onboard.protocol import Channel, Key, MtmError, Scheme
+from mtm_onboard.protocol.waveform import channel_tones
 from mtm_onboard.runtime.config import RobotConfig
 
 # Share of the ticks whose noise a limit may cut: above the first decoding gets worse, above the second it mostly fails.
@@ -60,7 +63,7 @@ def _parts_cut(config: RobotConfig, scheme: Scheme, channel: Channel) -> dict[st
     }
     if limits.acceleration_mps2 is not None:
         step = limits.acceleration_mps2 / scheme.rate_hz
-        parts["acceleration_mps2"] = _beyond(step / (sigma * _relative_change(scheme)), straight)
+        parts["acceleration_mps2"] = _beyond(step / (sigma * _relative_change(scheme, channel)), straight)
     return parts
 
 
@@ -71,8 +74,13 @@ def _beyond(bound: float, axes: int) -> float:
     return math.exp(-0.5 * bound * bound) if axes == 2 else math.erfc(bound / math.sqrt(2.0))
 
 
-def _relative_change(scheme: Scheme) -> float:
-    """Standard deviation of the noise's change from tick to tick, in sigmas, for power spread evenly over the band."""
+def _relative_change(scheme: Scheme, channel: Channel) -> float:
+    """Standard deviation of the noise's change from tick to tick, in sigmas."""
+    if scheme.spectrum is not None:
+        tones_hz, powers = channel_tones(scheme, channel)
+        turns = (2.0 * math.pi / scheme.rate_hz) * tones_hz
+        return math.sqrt(2.0 * (1.0 - float((powers * np.cos(turns)).mean())))
+    # Power spread evenly over the band.
     low, high = (2.0 * math.pi * edge_hz / scheme.rate_hz for edge_hz in scheme.band_hz)
     correlation = (math.sin(high) - math.sin(low)) / (high - low)
     return math.sqrt(2.0 * (1.0 - correlation))

@@ -10,7 +10,15 @@ from mtm_onboard.protocol.holding import Secret, holding_of
 from mtm_onboard.protocol.keystream import SECRET_BYTES
 from mtm_onboard.protocol.scheme import Channel, Scheme
 from mtm_onboard.protocol.slots import epoch_of_slot
-from mtm_onboard.protocol.waveform import Complexes, Floats, draw_tones, evaluate_window, phasors, tone_bins
+from mtm_onboard.protocol.waveform import (
+    Complexes,
+    Floats,
+    channel_tones,
+    draw_tones,
+    evaluate_window,
+    phasors,
+    tone_bins,
+)
 
 
 class Codebook:
@@ -40,8 +48,14 @@ class Codebook:
         """In-band bins of the channel's window, shape (K,)."""
         return tone_bins(self.scheme.window_ticks(channel), self.scheme.rate_hz, self.scheme.band_hz)
 
+    def tone_powers(self, channel: Channel) -> Floats:
+        """Mean power of each tone beside that of an even share, (K,): of mean 1, and 1 each without a spectrum."""
+        return channel_tones(self.scheme, channel)[1]
+
     def tones(self, channel: Channel, window: int, symbols: Sequence[int] | None = None) -> Complexes:
         """Complex tones of the asked symbols (all M when None): shape (symbols, axes, K), see `waveform.phasors`.
+
+        A spectrum multiplies each tone by the root of its power, the same for all symbols.
 
         `window` counts this channel's windows from the first one of `first_slot`. Raises MtmError for a symbol
         outside the alphabet and, under the rolling schedule, for a window before the Unix epoch or of a day or channel
@@ -62,10 +76,14 @@ class Codebook:
                 amplitudes[row, axis], phases_rad[row, axis] = draw_tones(
                     secret, epoch, played, symbol, first_axis + axis, count
                 )
-        return phasors(amplitudes, phases_rad, scheme.power)
+        flat = phasors(amplitudes, phases_rad, scheme.power)
+        return flat if scheme.spectrum is None else flat * np.sqrt(self.tone_powers(channel))
 
     def samples(self, channel: Channel, window: int, symbols: Sequence[int] | None = None) -> Floats:
-        """Unit-variance waveforms at the window's whole ticks: shape (symbols, axes, window_ticks)."""
+        """Unit-variance waveforms at the window's whole ticks: shape (symbols, axes, window_ticks).
+
+        Under power = "window" with a spectrum a window's mean square is 1 on the average over the key.
+        """
         tones = self.tones(channel, window, symbols)
         return evaluate_window(tones, self.bins(channel), self.scheme.window_ticks(channel))
 

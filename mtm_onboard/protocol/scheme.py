@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.framing.framing import Framing, layout_of
+from mtm_onboard.protocol.spectrum import Points, check_points, points_from_table
 
 SCHEME_VERSION = 1
 Combine = Literal["split", "same"]
@@ -44,7 +45,8 @@ class Scheme:
 
     `combine` is "split" (each channel carries its own part of the message) or "same" (all carry all of it, and
     the auditor pools by `pooling`). `power` and `schedule` are explained in `waveform` and `codebook`. `framing` says
-    what a message's symbols spell; None is a plain number.
+    what a message's symbols spell; None is a plain number. `spectrum` is points (Hz, dB) of the noise's power over the
+    band, see `spectrum`; None is flat.
     Raises MtmError on construction when the scheme cannot be played.
     """
 
@@ -60,6 +62,7 @@ class Scheme:
     schedule: Schedule = "fixed"
     epoch: int = 0
     framing: Framing | None = None
+    spectrum: Points | None = None
     version: int = SCHEME_VERSION
 
     def __post_init__(self) -> None:
@@ -107,9 +110,10 @@ class Scheme:
     def fingerprint(self) -> str:
         """Sixteen hexadecimal digits that differ when any parameter differs; safe to publish."""
         parameters = asdict(self)
-        # A scheme without framing keeps the fingerprint that it had before there was any.
-        if self.framing is None:
-            del parameters["framing"]
+        # A scheme without framing or spectrum keeps the fingerprint that it had before there was any.
+        for name in ("framing", "spectrum"):
+            if parameters[name] is None:
+                del parameters[name]
         canonical = json.dumps(parameters, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
@@ -152,12 +156,14 @@ def scheme_from_table(table: dict[str, Any]) -> Scheme:
     band = table["band_hz"]
     if not isinstance(band, list) or len(band) != 2:
         raise MtmError("the scheme's band_hz must be two numbers: [low, high]")
-    plain = {name: value for name, value in table.items() if name not in ("channels", "band_hz", "framing")}
+    built = ("channels", "band_hz", "framing", "spectrum")
+    plain = {name: value for name, value in table.items() if name not in built}
     return Scheme(
         **plain,
         band_hz=(band[0], band[1]),
         channels=tuple(_channel_from_table(entry) for entry in entries),
         framing=_framing_from_table(table["framing"]) if "framing" in table else None,
+        spectrum=points_from_table(table["spectrum"]) if "spectrum" in table else None,
     )
 
 
@@ -192,6 +198,8 @@ def _refuse_unknown(table: dict[str, Any], known: set[str], where: str) -> None:
 def _check(scheme: Scheme) -> None:
     _check_types(scheme)
     _check_band(scheme)
+    if scheme.spectrum is not None:
+        check_points(scheme.spectrum)
     if not 2 <= scheme.alphabet_size <= _MAX_ALPHABET:
         raise MtmError(f"alphabet_size is {scheme.alphabet_size}; choose 2 to {_MAX_ALPHABET}")
     if scheme.message_ticks > _MAX_MESSAGE_TICKS:

@@ -18,6 +18,8 @@ _CHANNEL_PARAMETERS = ("name", "body", "axes", "symbols", "sigma")
 def scheme_text(scheme: Scheme) -> str:
     """The scheme as the TOML table `[scheme]`, in scheme files and key files alike."""
     lines = ["[scheme]", *(f"{name} = {_toml(getattr(scheme, name))}" for name in _SCHEME_PARAMETERS)]
+    if scheme.spectrum is not None:
+        lines.append(f"spectrum = {_toml(scheme.spectrum)}")
     if scheme.framing is not None:
         lines += ["", "[scheme.framing]"]
         lines += [f"{name} = {_toml(value)}" for name, value in asdict(scheme.framing).items()]

@@ -4,6 +4,9 @@
 
 It is a formula in t, so both sides may evaluate it at any instant. With `power = "ensemble"` every sample is
 exactly N(0, 1) over keys; with `power = "window"` every window has mean square exactly 1.
+
+A spectrum multiplies each tone by sqrt(w_k), see `spectrum`. Samples of "ensemble" stay exactly N(0, 1); windows of
+"window" then have mean square 1 on the average over keys, and less spread than those of "ensemble".
 """
 
 import math
@@ -14,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mtm_onboard.protocol.keystream import stream
-from mtm_onboard.protocol.scheme import Power, count_bins
+from mtm_onboard.protocol.scheme import Channel, Power, Scheme, count_bins
+from mtm_onboard.protocol.spectrum import tone_powers
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -32,6 +36,15 @@ def tone_bins(window_ticks: int, rate_hz: float, band_hz: tuple[float, float]) -
     assert len(chosen) == count_bins(window_ticks, rate_hz, band_hz)
     chosen.flags.writeable = False
     return chosen
+
+
+def channel_tones(scheme: Scheme, channel: Channel) -> tuple[Floats, Floats]:
+    """Each tone's frequency in hertz, and its mean power beside that of an even share, of mean 1: (K,) each."""
+    ticks = scheme.window_ticks(channel)
+    tones_hz = tone_bins(ticks, scheme.rate_hz, scheme.band_hz) * scheme.rate_hz / ticks
+    if scheme.spectrum is None:
+        return tones_hz, np.ones(len(tones_hz))
+    return tones_hz, tone_powers(scheme.spectrum, tones_hz)
 
 
 def draw_tones(secret: bytes, epoch: int, window: int, symbol: int, axis: int, tones: int) -> tuple[Floats, Floats]:

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mtm_onboard.firmware.image import ONE, channel_image, image_bytes
-from mtm_onboard.protocol import Channel, Codebook, Scheme
+from mtm_onboard.firmware.image import ONE, image_bytes
 from mtm_onboard.protocol.atomicfile import replacing
 from tests.firmware.shim_gateway import CONTROLLER, Board, Frame, cut, speed_message
 from tests.firmware.shim_model import WIDE_LIMITS, ShimModel, in_q20, random_image
 from tests.firmware.shim_player import ShimPlayer
-from tests.firmware.test_playing import VECTORS, message_image
+from tests.firmware.test_playing import VECTORS, message_image, reference_image
 from tests.firmware.test_wire import FRAMES
 
 WIDE = in_q20(WIDE_LIMITS)
@@ -51,20 +50,8 @@ def reference_vectors() -> list[str]:
     """The independent reference's waveforms with sigma 0.1, in 2**-20, and the bound of the fixed point."""
     lines, cases = [], []
     for number, vector in enumerate(VECTORS):
-        axis, window = vector["axis"], vector["window"]
-        scheme = Scheme(
-            name="reference",
-            rate_hz=float(vector["rate_hz"]),
-            band_hz=(float(vector["band_hz"][0]), float(vector["band_hz"][1])),
-            alphabet_size=512,
-            message_ticks=vector["window_ticks"],
-            channels=(Channel("robot", "robot", ("vx", "vy", "wz")[: axis + 1], 1, 0.1),),
-            power=vector["power"],
-            schedule="rolling" if window else "fixed",
-            epoch=vector["epoch"],
-        )
-        book = Codebook(bytes.fromhex(vector["key_hex"]), scheme)
-        image = channel_image(book, "robot", (vector["symbol"],), limits=WIDE_LIMITS, first_message=window)
+        axis = vector["axis"]
+        image = reference_image(vector)
         # A quarter of a unit is lost where the reference is rounded to 2**-21.
         bound = int(2 * (image.steps[axis] / (1 << 17) + 0.5) + 1)
         samples = [round(0.1 * float(sample) * 2 * ONE) for sample in vector["samples"]]

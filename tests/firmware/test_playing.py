@@ -18,8 +18,13 @@ from tests.firmware.shim_model import (
 )
 from tests.firmware.shim_player import ShimPlayer
 
-VECTORS = json.loads((Path(__file__).parents[1] / "onboard/protocol/waveform_v1.json").read_text())
-KEY_TREE = json.loads((Path(__file__).parents[1] / "onboard/protocol/key_tree_v2.json").read_text())
+_PROTOCOL = Path(__file__).parents[1] / "onboard/protocol"
+VECTORS = [
+    vector
+    for name in ("waveform_v1", "waveform_spectrum_v1")
+    for vector in json.loads((_PROTOCOL / f"{name}.json").read_text())
+]
+KEY_TREE = json.loads((_PROTOCOL / "key_tree_v2.json").read_text())
 SECRET = b"not a real secret, only for test"
 WIDE = in_q20(WIDE_LIMITS)
 
@@ -42,6 +47,29 @@ def codebook(schedule="fixed", ticks=60, rate_hz=50.0):
 
 def message_image(schedule="fixed", *, limits=WIDE_LIMITS, ticks=60, **options):
     return channel_image(codebook(schedule, ticks), "robot", (1, 2), limits=limits, **options)
+
+
+def reference_image(vector):
+    """The image of an independent reference's waveform, whose axis is the channel's last, with sigma 0.1."""
+    scheme = Scheme(
+        name="reference",
+        rate_hz=float(vector["rate_hz"]),
+        band_hz=(float(vector["band_hz"][0]), float(vector["band_hz"][1])),
+        alphabet_size=512,
+        message_ticks=vector["window_ticks"],
+        channels=(Channel("robot", "robot", ("vx", "vy", "wz")[: vector["axis"] + 1], 1, 0.1),),
+        power=vector["power"],
+        schedule="rolling" if vector["window"] else "fixed",
+        epoch=vector["epoch"],
+        spectrum=tuple((float(hz), float(db)) for hz, db in vector["spectrum"]) if "spectrum" in vector else None,
+    )
+    book = Codebook(bytes.fromhex(vector["key_hex"]), scheme)
+    return channel_image(book, "robot", (vector["symbol"],), limits=WIDE_LIMITS, first_message=vector["window"])
+
+
+def vector_name(vector):
+    shape = "spectrum" if "spectrum" in vector else "flat"
+    return f"n{vector['window_ticks']}-{vector['symbol']}-{vector['power']}-{shape}"
 
 
 def pair(image, **settings):
@@ -70,25 +98,10 @@ def test_output_is_within_one_bit_of_floating_point():
     assert 0.3 < worst <= 1.0
 
 
-@pytest.mark.parametrize("vector", VECTORS, ids=lambda v: f"n{v['window_ticks']}-{v['symbol']}-{v['power']}")
+@pytest.mark.parametrize("vector", VECTORS, ids=vector_name)
 def test_the_reference_waveforms_are_played_to_the_stated_bound(vector):
-    window, axis, sigma = vector["window"], vector["axis"], 0.1
-    rolling = window > 0
-    band_hz = (float(vector["band_hz"][0]), float(vector["band_hz"][1]))
-    axes = ("vx", "vy", "wz")[: axis + 1]
-    scheme = Scheme(
-        name="reference",
-        rate_hz=float(vector["rate_hz"]),
-        band_hz=band_hz,
-        alphabet_size=512,
-        message_ticks=vector["window_ticks"],
-        channels=(Channel("robot", "robot", axes, 1, sigma),),
-        power=vector["power"],
-        schedule="rolling" if rolling else "fixed",
-        epoch=vector["epoch"],
-    )
-    book = Codebook(bytes.fromhex(vector["key_hex"]), scheme)
-    image = channel_image(book, "robot", (vector["symbol"],), limits=WIDE_LIMITS, first_message=window)
+    axis, sigma = vector["axis"], 0.1
+    image = reference_image(vector)
     player = ShimPlayer(image.rate_mhz, WIDE, 9_999, 10_000)
     assert player.offer(image) == 0
     played = [player.tick(tick * 10**9 // image.rate_mhz, (0, 0, 0))[axis] for tick in range(vector["window_ticks"])]

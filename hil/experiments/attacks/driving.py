@@ -19,7 +19,7 @@ from hil.worlds.noise import keyed_noise
 from hil.worlds.world import Integers, Rollout
 from mtm_audit.model.glimpse import glimpse_of_track
 from mtm_audit.model.track import Floats, Track
-from mtm_onboard.protocol import Codebook
+from mtm_onboard.protocol import Codebook, Scheme
 
 READERS = (COHERENCY, MATCHED)
 POINT = headline_point("discovery", 120)
@@ -42,9 +42,9 @@ def goals_of(seed: int) -> Integers:
     return np.random.default_rng([_GOALS_STREAM, seed]).permutation(GOALS)
 
 
-def codebook_of(seed: int) -> Codebook:
+def codebook_of(seed: int, scheme: Scheme = SCHEME) -> Codebook:
     """A rollout's codebook."""
-    return Codebook(np.random.default_rng([_KEYS_STREAM, seed]).bytes(32), SCHEME)
+    return Codebook(np.random.default_rng([_KEYS_STREAM, seed]).bytes(32), scheme)
 
 
 def noise_of(codebook: Codebook, goals: Integers) -> Floats:
@@ -79,12 +79,16 @@ def scores_of(codebook: Codebook, rollout: Rollout, seed: int, reader: str) -> F
 
 
 def suppressed(
-    tamper: Callable[[int, np.random.Generator], Tamper], rollouts: int, seed: int, injected: Injected | None = None
+    tamper: Callable[[int, np.random.Generator], Tamper],
+    rollouts: int,
+    seed: int,
+    injected: Injected | None = None,
+    scheme: Scheme = SCHEME,
 ) -> dict[str, Scalar]:
     """What is left of the messages when the tampering of so many rollouts is made by `tamper(rollouts, draw)`."""
     seeds = range(seed, seed + rollouts)
     draw = np.random.default_rng([_KEYS_STREAM, _GOALS_STREAM, seed])
-    goals, books = np.array([goals_of(own) for own in seeds]), [codebook_of(own) for own in seeds]
+    goals, books = np.array([goals_of(own) for own in seeds]), [codebook_of(own, scheme) for own in seeds]
     noise = np.stack([noise_of(book, own) for book, own in zip(books, goals, strict=True)])
     if injected is not None:
         noise = injected(noise, draw)
@@ -118,12 +122,12 @@ def costs(driven: Sequence[Rollout], goals: Integers) -> dict[str, Scalar]:
     }
 
 
-@lru_cache(maxsize=1)
-def overheard() -> tuple[Floats, Floats, Floats]:
+@lru_cache(maxsize=4)
+def overheard(scheme: Scheme = SCHEME) -> tuple[Floats, Floats, Floats]:
     """Noise, exact positions before each tick and observed ones, (rollouts, ticks, 2), of rollouts to learn from."""
     seeds = range(_LEARNING_SEED, _LEARNING_SEED + _LEARNING)
     goals = np.array([goals_of(own) for own in seeds])
-    noise = np.stack([noise_of(codebook_of(own), each) for own, each in zip(seeds, goals, strict=True)])
+    noise = np.stack([noise_of(codebook_of(own, scheme), each) for own, each in zip(seeds, goals, strict=True)])
     driven = drive(goals, noise, seeds, untouched)
     exact_m = np.stack([rollout.shots[0].states[:-1] for rollout in driven])
     filmed_m = np.stack([observed_m(rollout, own)[:-1] for rollout, own in zip(driven, seeds, strict=True)])

@@ -2,10 +2,12 @@
 
 From the noise of past commands, which takes the policy and a tap on the commands; or from past motion, exact or as a
 camera sees it, which takes neither. The level is by how many ticks the newest that is known is late. With a white
-floor of the robot's own under the band, whose density is so many decibels below the band's, less can be foretold.
+floor of the robot's own under the band, whose density is so many decibels below the band's, less can be foretold;
+and so it is with a keyed floor: a spectrum of the scheme, which leaves the total power what it is.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,11 +25,15 @@ from hil.experiments.attacks.foretelling import fitted, lagged, share_foretold
 from hil.experiments.runs.cells import Scalar
 from hil.worlds.discovery import Tamper, Tick
 from mtm_audit.model.track import Floats
+from mtm_onboard.protocol import Scheme
 
 COMMANDS, EXACT, FILMED = "from commands", "from exact motion", "from filmed motion"
 FLOORED = {"from commands, white floor at -10 dB": -10.0, "from commands, white floor at -5 dB": -5.0}
+KEYED_FLOORED = {"from commands, keyed floor at -10 dB": -10.0, "from commands, keyed floor at -5 dB": -5.0}
 _LEVELS = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)
 _MEMORY = 30
+# Half of the distance of two tones of a window, and less.
+_EDGE_HZ = 0.04
 
 
 class Foreteller:
@@ -75,9 +81,9 @@ class Foreteller:
         return step_m
 
 
-def learnt_weights(source: str, latency: int, floor_mps: float = 0.0) -> Floats:
+def learnt_weights(source: str, latency: int, floor_mps: float = 0.0, scheme: Scheme = SCHEME) -> Floats:
     """What foretells the noise of a tick best in rollouts that were overheard."""
-    noise, exact_m, filmed_m = overheard()
+    noise, exact_m, filmed_m = overheard(scheme)
     if floor_mps:
         noise = noise + floor_mps * np.random.default_rng(0).standard_normal(noise.shape)
     target = noise.transpose(0, 2, 1).reshape(-1, TICKS)
@@ -97,10 +103,20 @@ def floor_mps(below_band_db: float) -> float:
     return float(SIGMA_MPS * np.sqrt(10.0 ** (below_band_db / 10.0) * 0.5 * SCHEME.rate_hz / (high_hz - low_hz)))
 
 
+def floored_scheme(below_band_db: float) -> Scheme:
+    """The scheme with its band all over what it can play, and a spectrum so many decibels fainter beside the band."""
+    low_hz, high_hz = SCHEME.band_hz
+    spectrum = (
+        (low_hz - _EDGE_HZ, below_band_db), (low_hz, 0.0), (high_hz, 0.0), (high_hz + _EDGE_HZ, below_band_db),
+    )  # fmt: skip
+    return replace(SCHEME, band_hz=(_EDGE_HZ, 0.5 * SCHEME.rate_hz - _EDGE_HZ), spectrum=spectrum)
+
+
 def _measure(arm: str, level: float, rollouts: int, seed: int) -> Mapping[str, Scalar]:
-    source, latency = (COMMANDS, round(level)) if arm in FLOORED else (arm, round(level))
+    source, latency = (COMMANDS if arm in FLOORED or arm in KEYED_FLOORED else arm), round(level)
     floor = floor_mps(FLOORED[arm]) if arm in FLOORED else 0.0
-    weights = learnt_weights(source, latency, floor)
+    scheme = floored_scheme(KEYED_FLOORED[arm]) if arm in KEYED_FLOORED else SCHEME
+    weights = learnt_weights(source, latency, floor, scheme)
     made: list[Foreteller] = []
 
     def make(count: int, draw: np.random.Generator) -> Tamper:
@@ -110,11 +126,11 @@ def _measure(arm: str, level: float, rollouts: int, seed: int) -> Mapping[str, S
     def injected(noise: Floats, draw: np.random.Generator) -> Floats:
         return np.asarray(noise + floor * draw.standard_normal(noise.shape))
 
-    return {**suppressed(make, rollouts, seed, injected if floor else None), FORETOLD: made[0].share}
+    return {**suppressed(make, rollouts, seed, injected if floor else None, scheme), FORETOLD: made[0].share}
 
 
 ATTACK = Attack(
     name="prediction", level="latency, ticks of 0.1 s", counted="messages right",
-    levels=dict.fromkeys((COMMANDS, EXACT, FILMED, *FLOORED), _LEVELS), measure=_measure,
+    levels=dict.fromkeys((COMMANDS, EXACT, FILMED, *FLOORED, *KEYED_FLOORED), _LEVELS), measure=_measure,
     chance_percent=CHANCE_PERCENT,
 )  # fmt: skip

@@ -28,6 +28,7 @@ from mtm_onboard.protocol import Scheme
 
 COHERENCY, MATCHED, GENIE = "coherency", "matched", "genie"
 _SILENT_SEED = 2_000_000
+_HIGHEST_HZ = fleet_scheme().band_hz[1]
 
 
 def rollout_parameters(job: Job, plant: MecanumParameters, silences: int, *, coherency: bool) -> dict[str, Scalar]:
@@ -112,13 +113,20 @@ def _motions(glimpses: Sequence[Glimpse], scheme: Scheme) -> list[Motion]:
     return [uniform_motion(glimpse, scheme.band_hz[1]) for glimpse in glimpses]
 
 
-def silent_motions(seconds: float, plant: MecanumParameters, silences: int) -> list[Motion]:
-    """Motions of that length without a message: all robots of `silences` recordings, on none of which is measured."""
+def silent_motions(
+    seconds: float, plant: MecanumParameters, silences: int, highest_hz: float = _HIGHEST_HZ
+) -> list[Motion]:
+    """Motions of that length without a message: all robots of `silences` recordings, on none of which is measured.
+
+    Their time bins are those of motions that carry noise up to `highest_hz`.
+    """
     recordings = [record_silence(seconds, plant, _SILENT_SEED + number) for number in range(silences)]
-    return [motion for recording in recordings for motion in _motions(recording, fleet_scheme())]
+    return [uniform_motion(glimpse, highest_hz) for recording in recordings for glimpse in recording]
 
 
 @lru_cache(maxsize=64)
-def learned_interference(seconds: float, plant: MecanumParameters, silences: int) -> Interference:
+def learned_interference(
+    seconds: float, plant: MecanumParameters, silences: int, highest_hz: float = _HIGHEST_HZ
+) -> Interference:
     """The interference that the genie is given for recordings of that length."""
-    return fit_interference(silent_motions(seconds, plant, silences))
+    return fit_interference(silent_motions(seconds, plant, silences, highest_hz))

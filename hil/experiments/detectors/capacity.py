@@ -13,6 +13,7 @@ from scipy.signal import welch
 from hil.plants.mecanum import MecanumParameters
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.model.track import Floats
+from mtm_audit.planning import waterfill
 
 _SEGMENT_BINS = 64
 _FREQUENCIES = 400
@@ -26,6 +27,14 @@ def capacity_bps(
     `silences` are motions without a message. The interference is taken as Gaussian and stationary with their mean
     spectrum; a detector that makes use of times when it is weaker can exceed the bound.
     """
+    _, ratios = signal_to_interference(plant, sigma, rate_hz, band_hz, silences)
+    return waterfill.capacity_bps(ratios, np.ones(ratios.shape[1]), band_hz[1] - band_hz[0])
+
+
+def signal_to_interference(
+    plant: MecanumParameters, sigma: float, rate_hz: float, band_hz: tuple[float, float], silences: Sequence[Motion]
+) -> tuple[Floats, Floats]:
+    """Frequencies (K,) evenly over the band, and at each the ratio of the two densities on each axis, (axes, K)."""
     step_s = silences[0].step_s
     measured_hz, _ = welch(silences[0].velocities, 1.0 / step_s, nperseg=_SEGMENT_BINS)
     frequencies_hz = np.linspace(*band_hz, _FREQUENCIES)
@@ -34,8 +43,7 @@ def capacity_bps(
     # A sum of evenly spaced tones in the band, held over each tick, lagged, and averaged over each time bin.
     sent = sigma**2 / (band_hz[1] - band_hz[0])
     gain = _gain(plant, rate_hz, step_s, frequencies_hz)
-    bits = np.log2(1.0 + sent * gain / interference).mean(axis=1)
-    return float(bits.sum() * (band_hz[1] - band_hz[0]))
+    return frequencies_hz, sent * gain / interference
 
 
 def _spectrum(motion: Motion) -> Floats:

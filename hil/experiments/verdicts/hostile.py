@@ -17,6 +17,8 @@ from mtm_onboard.protocol.waveform import tone_bins
 
 _ALPHABET, _TICKS, _BAND_HZ, _RATE_HZ, _SIGMA = 4, 200, (0.5, 5.0), 50.0, 0.1
 _CROWD = 100
+# A slope in the band and a faint tone at its edge.
+_SPECTRUM = ((0.5, -20.0), (0.75, 6.0), (5.0, -6.0))
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ def hostile_recording(kind: str, number: int, seed: int) -> Recording:
     """The recording of that kind and number, the same for the same seed.
 
     Even ones are read from a known onset; of each two, four and eight in turn others have the sphere's law or the
-    normal one and one or two symbols a message.
+    normal one and one or two symbols a message, and from the eighth on their noise has a spectrum.
     """
     draw = np.random.default_rng([seed, list(KINDS).index(kind), number])
     power: Power = "window" if number // 2 % 2 == 0 else "ensemble"
@@ -45,7 +47,7 @@ def hostile_recording(kind: str, number: int, seed: int) -> Recording:
     names = [f"robot{row}" for row in range(robots)]
     channels = tuple(Channel(name, name, ("vx", "vy"), symbols, _SIGMA) for name in names)
     scheme = Scheme(name="hostile", rate_hz=_RATE_HZ, band_hz=_BAND_HZ, alphabet_size=_ALPHABET, message_ticks=_TICKS,
-                    channels=channels, power=power)  # fmt: skip
+                    channels=channels, power=power, spectrum=_SPECTRUM if number >= 8 else None)  # fmt: skip
     known_s = float(draw.uniform(0.0, 1.0))
     return Recording(tuple(maker(scheme, draw)), scheme, known_s if number % 2 == 0 else None)
 

@@ -3,7 +3,7 @@
 Nothing here depends on the key beyond its scheme: the recording and the place where to look settle all of it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +73,12 @@ def project(prepared: Prepared, places: Places) -> Projections:
     settled = tone_responses(places.plants, places.tones_hz, np.array([MEMORY_S]), 2.0 * MEMORY_S)[:, :, 0]
     filtered = power_response(prepared.noise_filters, places.tones_hz * step_s) * relative[:, None] ** 2
     return Projections(linear, counted, np.abs(settled[:, None]) ** 2 * filtered, places.length_s / step_s)
+
+
+def shaped(projections: Projections, powers: Floats) -> Projections:
+    """What tones of those mean `powers` (K,), in units of their spread, show: as of tones that are alike loud."""
+    spreads = np.sqrt(np.concatenate([powers, powers]))
+    return replace(projections, linear=projections.linear * spreads, power=projections.power * powers)
 
 
 def _relative_precision(scales: Floats) -> Floats:

@@ -58,3 +58,15 @@ def test_a_body_that_stands_still_is_coherent_with_nothing():
 @pytest.mark.parametrize(("ticks", "length"), [(48, 24), (49, 24), (255, 127), (256, 128), (5000, 128)])
 def test_segments_are_as_long_as_the_paper_says(ticks, length):
     assert segment_length(ticks) == length
+
+
+def test_each_bin_counts_in_proportion_to_its_power():
+    bins, powers = np.array([3, 5, 11]), np.array([0.2, 0.7, 2.1])
+    sent, seen = RNG.standard_normal((4, 2, 300)), RNG.standard_normal((3, 2, 300))
+    by_bin = [
+        mean_coherency(segment_spectra(sent, bins[[place]]), segment_spectra(seen, bins[[place]])) for place in range(3)
+    ]
+    found = mean_coherency(segment_spectra(sent, bins), segment_spectra(seen, bins), powers)
+    assert found == pytest.approx(np.einsum("k,kcr->cr", powers / 3.0, by_bin))
+    plain = mean_coherency(segment_spectra(sent, bins), segment_spectra(seen, bins))
+    assert np.array_equal(mean_coherency(segment_spectra(sent, bins), segment_spectra(seen, bins), np.ones(3)), plain)

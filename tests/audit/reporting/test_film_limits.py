@@ -23,14 +23,16 @@ def quieter(sigma):
     return replace(SCHEME, channels=(replace(SCHEME.channels[0], sigma=sigma),))
 
 
-def test_the_displacement_is_that_of_the_waveforms():
+@pytest.mark.parametrize("spectrum", [None, ((0.5, -12.0), (5.0, 0.0))], ids=["flat", "slope"])
+def test_the_displacement_is_that_of_the_waveforms(spectrum):
+    scheme = replace(SCHEME, spectrum=spectrum)
     squares = []
     for number in range(200):
         secret = FAKE_SECRET[:30] + number.to_bytes(2, "big")
-        waveform = Codebook(secret, SCHEME).samples(SCHEME.channels[0], 0)[0, 0]
-        moved_m = 0.1 * np.cumsum(waveform - waveform.mean()) / SCHEME.rate_hz
+        waveform = Codebook(secret, scheme).samples(scheme.channels[0], 0)[0, 0]
+        moved_m = 0.1 * np.cumsum(waveform - waveform.mean()) / scheme.rate_hz
         squares.append(np.var(moved_m))
-    assert displacement_m(SCHEME.channels[0], SCHEME) == pytest.approx(np.sqrt(np.mean(squares)), rel=0.1)
+    assert displacement_m(scheme.channels[0], scheme) == pytest.approx(np.sqrt(np.mean(squares)), rel=0.1)
 
 
 def test_a_loud_message_is_not_lost_where_markers_are_read():

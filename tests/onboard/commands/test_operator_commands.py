@@ -344,3 +344,29 @@ def test_a_period_that_is_none_is_wrong_usage(config, period):
     with pytest.raises(SystemExit) as left:
         main(["status", "--config", str(config), "--watch", period])
     assert left.value.code == 2
+
+
+def test_keygen_shapes_the_spectrum_and_show_tells_it(tmp_path, capsys):
+    shaped = ("--preset", "robomaster-fleet", "--spectrum", "0.5:3,2:3,5:-6.5")
+    assert keygen(tmp_path, *shaped) == 0
+    assert load_key(tmp_path / "robot.key").scheme.spectrum == ((0.5, 3.0), (2.0, 3.0), (5.0, -6.5))
+    assert main(["show", "--key", str(tmp_path / "robot.key")]) == 0
+    assert "spectrum      0 dB at 0.5 Hz, 0 dB at 2 Hz, -9.5 dB at 5 Hz\n" in capsys.readouterr().out
+
+
+def test_a_flat_spectrum_is_none_at_all(tmp_path, capsys):
+    assert keygen(tmp_path, "--preset", "robomaster-fleet", "--spectrum", "flat") == 0
+    assert load_key(tmp_path / "robot.key").scheme.spectrum is None
+    assert main(["show", "--key", str(tmp_path / "robot.key")]) == 0
+    assert "spectrum      flat\n" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("text", ["loud", "0.5", "0.5:0,5", "5:0,0.5:-6", "1:0", "1:0,2:nan", "1:0:0,2:0"])
+def test_a_spectrum_that_cannot_be_is_a_usage_error(tmp_path, capsys, text):
+    try:
+        code = keygen(tmp_path, "--preset", "robomaster-fleet", "--spectrum", text)
+    except SystemExit as ended:
+        code = ended.code
+    assert code == 2
+    assert "spectrum" in capsys.readouterr().err
+    assert not (tmp_path / "robot.key").exists()

@@ -82,7 +82,10 @@ def test_the_part_that_is_cut_is_the_part_that_the_guard_cuts():
         assert found(**{name: bound}).figures["cut_part"] == pytest.approx(cut[name], abs=0.015)
 
 
-def test_the_change_a_tick_is_that_of_noise_in_the_band():
-    plays = Modulator(small_codebook(message_ticks=6000), "a", (0,))
+@pytest.mark.parametrize("spectrum", [None, ((2.0, 0.0), (20.0, -15.0))], ids=["flat", "slope"])
+def test_the_change_a_tick_is_that_of_noise_in_the_band(spectrum):
+    plays = Modulator(small_codebook(message_ticks=6000, spectrum=spectrum), "a", (0,))
     noise = np.array([plays.perturbation(tick) for tick in range(6000)])
-    assert _relative_change(small_scheme()) == pytest.approx(np.diff(noise, axis=0).std() / noise.std(), rel=0.03)
+    scheme = small_scheme(spectrum=spectrum)
+    change = _relative_change(scheme, scheme.channels[0])
+    assert change == pytest.approx(np.diff(noise, axis=0).std() / noise.std(), rel=0.03)

@@ -81,11 +81,13 @@ def test_a_table_without_a_needed_field_is_refused_by_name(name):
         scheme_from_table(table)
 
 
-@pytest.mark.parametrize("name", ["combine", "pooling", "power", "schedule", "epoch", "framing"])
+@pytest.mark.parametrize("name", ["combine", "pooling", "power", "schedule", "epoch", "framing", "spectrum"])
 def test_a_table_without_an_optional_field_has_its_default(name):
-    table = table_of(FRAMED)
+    table = table_of(replace(FRAMED, spectrum=((2.0, 0.0), (20.0, -6.0))))
     del table[name]
-    defaults = dict(combine="split", pooling="mean", power="window", schedule="fixed", epoch=0, framing=None)
+    defaults = dict(
+        combine="split", pooling="mean", power="window", schedule="fixed", epoch=0, framing=None, spectrum=None
+    )
     assert getattr(scheme_from_table(table), name) == defaults[name]
 
 
@@ -279,4 +281,5 @@ def test_edges_of_the_band_belong_to_it():
 
 
 def test_no_parameter_is_left_out_of_the_table():
-    assert set(table_of(FRAMED)) == set(json.loads(json.dumps(asdict(FRAMED))))
+    whole = replace(FRAMED, spectrum=((2.0, 0.0), (20.0, -6.0)))
+    assert set(table_of(whole)) == set(json.loads(json.dumps(asdict(whole))))

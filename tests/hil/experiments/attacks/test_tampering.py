@@ -7,13 +7,14 @@ from hil.experiments.attacks import desynchronisation, jamming, prediction
 from hil.experiments.attacks.additive_noise import with_white_noise
 from hil.experiments.attacks.band_stop import without_band
 from hil.experiments.attacks.codebook_learning import mean_windows
-from hil.experiments.attacks.driving import SIGMA_MPS, band_noise, codebook_of, goals_of, noise_of
+from hil.experiments.attacks.driving import SCHEME, SIGMA_MPS, band_noise, codebook_of, goals_of, noise_of
 from hil.experiments.attacks.foretelling import fitted, lagged, share_foretold
 from hil.experiments.attacks.noise_replacement import replacing
 from hil.experiments.attacks.prediction import Foreteller, floor_mps
 from hil.experiments.attacks.steganalysis import band_powers, ranked_higher
 from hil.experiments.attacks.whitening import whitening, whitening_weights
 from hil.worlds.discovery import Tick
+from mtm_onboard.protocol.waveform import channel_tones
 
 ROLLOUTS, TICKS = 3, 960
 
@@ -73,7 +74,7 @@ def test_whitened_noise_fills_the_spectrum_as_loud_as_before(noise):
 
 @pytest.mark.parametrize(("latency", "least", "most"), [(0, 0.9, 1.0), (30, -0.1, 0.4)])
 def test_the_noise_of_known_commands_is_foretold_while_recent(noise, monkeypatch, latency, least, most):
-    monkeypatch.setattr(prediction, "overheard", lambda: (noise, noise, noise))
+    monkeypatch.setattr(prediction, "overheard", lambda scheme: (noise, noise, noise))
     weights = prediction.learnt_weights(prediction.COMMANDS, latency)
     foreteller = Foreteller(weights, latency, prediction.COMMANDS, ROLLOUTS, np.random.default_rng(3))
     other = np.stack([noise_of(codebook_of(seed), goals_of(seed)) for seed in range(50, 50 + ROLLOUTS)])
@@ -86,6 +87,31 @@ def test_a_white_floor_has_the_density_that_was_asked_for():
     # The band is a fifth of the spectrum: the same density in all of it is five times the power.
     assert floor_mps(0.0) ** 2 == pytest.approx(5.0 * SIGMA_MPS**2)
     assert floor_mps(-10.0) ** 2 == pytest.approx(0.5 * SIGMA_MPS**2)
+
+
+@pytest.mark.parametrize("below_db", [-10.0, -5.0])
+def test_a_keyed_floor_is_a_spectrum_of_the_same_power(below_db):
+    scheme = prediction.floored_scheme(below_db)
+    tones_hz, powers = channel_tones(scheme, scheme.channels[0])
+    inside = (tones_hz >= SCHEME.band_hz[0]) & (tones_hz <= SCHEME.band_hz[1])
+    # All tones that ten ticks a second and twelve seconds can have.
+    assert len(tones_hz) == 59
+    assert 10.0 * np.log10(powers[~inside] / powers[inside][0]) == pytest.approx(below_db)
+    assert powers.mean() == pytest.approx(1.0)
+    played_mps = noise_of(codebook_of(3, scheme), goals_of(3))
+    assert np.std(played_mps) == pytest.approx(SIGMA_MPS, rel=0.1)
+
+
+@pytest.mark.parametrize(("below_db", "most"), [(-10.0, 0.55), (-5.0, 0.25)])
+def test_less_is_foretold_of_noise_with_a_keyed_floor(monkeypatch, below_db, most):
+    scheme = prediction.floored_scheme(below_db)
+    noise = np.stack([noise_of(codebook_of(seed, scheme), goals_of(seed)) for seed in range(ROLLOUTS)])
+    monkeypatch.setattr(prediction, "overheard", lambda asked: (noise, noise, noise) if asked == scheme else None)
+    weights = prediction.learnt_weights(prediction.COMMANDS, 0, scheme=scheme)
+    foreteller = Foreteller(weights, 0, prediction.COMMANDS, ROLLOUTS, np.random.default_rng(3))
+    other = np.stack([noise_of(codebook_of(seed, scheme), goals_of(seed)) for seed in range(50, 50 + ROLLOUTS)])
+    played(foreteller, other)
+    assert 0.0 < foreteller.share < most
 
 
 def test_a_network_learns_what_can_be_learnt_of_its_inputs():
