@@ -10,7 +10,7 @@ from mtm_onboard.protocol.holding import Secret, holding_of
 from mtm_onboard.protocol.keystream import SECRET_BYTES
 from mtm_onboard.protocol.scheme import Channel, Scheme
 from mtm_onboard.protocol.slots import epoch_of_slot
-from mtm_onboard.protocol.waveform import Complexes, Floats, draw_tones, evaluate_window, phasors, tone_bins
+from mtm_onboard.protocol.waveform import Complexes, Floats, draw_alphabet, evaluate_window, phasors, tone_bins
 
 
 class Codebook:
@@ -53,15 +53,11 @@ class Codebook:
         secret = self._holding.channel_secret(epoch, scheme.channel_number(channel))
         first_axis = scheme.axis_index(channel)
         count = len(self.bins(channel))
-        amplitudes = np.empty((len(asked), len(channel.axes), count))
-        phases_rad = np.empty_like(amplitudes)
-        for row, symbol in enumerate(asked):
-            if not 0 <= symbol < scheme.alphabet_size:
-                raise MtmError(f"symbol {symbol} is outside the alphabet; choose 0 to {scheme.alphabet_size - 1}")
-            for axis in range(len(channel.axes)):
-                amplitudes[row, axis], phases_rad[row, axis] = draw_tones(
-                    secret, epoch, played, symbol, first_axis + axis, count
-                )
+        wrong = next((symbol for symbol in asked if not 0 <= symbol < scheme.alphabet_size), None)
+        if wrong is not None:
+            raise MtmError(f"symbol {wrong} is outside the alphabet; choose 0 to {scheme.alphabet_size - 1}")
+        axes = range(first_axis, first_axis + len(channel.axes))
+        amplitudes, phases_rad = draw_alphabet(secret, epoch, played, asked, axes, count)
         return phasors(amplitudes, phases_rad, scheme.power)
 
     def samples(self, channel: Channel, window: int, symbols: Sequence[int] | None = None) -> Floats:

@@ -7,13 +7,14 @@ exactly N(0, 1) over keys; with `power = "window"` every window has mean square 
 """
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_onboard.protocol.keystream import stream
+from mtm_onboard.protocol.keystream import streams
 from mtm_onboard.protocol.scheme import Power, count_bins
 
 Floats = NDArray[np.float64]
@@ -36,10 +37,19 @@ def tone_bins(window_ticks: int, rate_hz: float, band_hz: tuple[float, float]) -
 
 def draw_tones(secret: bytes, epoch: int, window: int, symbol: int, axis: int, tones: int) -> tuple[Floats, Floats]:
     """Amplitudes A_k (Rayleigh) and phases phi_k (uniform, radians) of one waveform, each of shape (tones,)."""
-    data = stream(secret, "symbol", (epoch, window, symbol, axis), _BYTES_PER_TONE * tones)
-    words = np.frombuffer(data, dtype="<u8").reshape(tones, 2) >> np.uint64(11)
-    uniform = (words[:, 0].astype(np.float64) + 0.5) / 2.0**53
-    turns = words[:, 1].astype(np.float64) / 2.0**53
+    amplitudes, phases_rad = draw_alphabet(secret, epoch, window, [symbol], [axis], tones)
+    return amplitudes[0, 0], phases_rad[0, 0]
+
+
+def draw_alphabet(
+    secret: bytes, epoch: int, window: int, symbols: Sequence[int], axes: Sequence[int], tones: int
+) -> tuple[Floats, Floats]:
+    """Amplitudes and phases as of `draw_tones` for each symbol and axis: (symbols, axes, tones) each."""
+    places = ((epoch, window, symbol, axis) for symbol in symbols for axis in axes)
+    data = streams(secret, "symbol", places, _BYTES_PER_TONE * tones)
+    words = np.frombuffer(data, dtype="<u8").reshape(len(symbols), len(axes), tones, 2) >> np.uint64(11)
+    uniform = (words[..., 0].astype(np.float64) + 0.5) / 2.0**53
+    turns = words[..., 1].astype(np.float64) / 2.0**53
     return np.sqrt(-2.0 * np.log(uniform)), 2.0 * np.pi * turns
 
 
