@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from mtm_audit.detectors.base import ChannelReading
-from mtm_audit.detectors.matched.correlate import Prepared, stacked_tones
+from mtm_audit.detectors.matched.candidates import stacked_tones
+from mtm_audit.detectors.matched.correlate import Prepared
 from mtm_audit.detectors.matched.evidence import log_sum_exp
 from mtm_audit.detectors.matched.plants import Plants, joined, plant_family, returning, second_order
 from mtm_audit.detectors.matched.projections import Places, Projections, project, shaped

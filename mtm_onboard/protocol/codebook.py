@@ -14,7 +14,7 @@ from mtm_onboard.protocol.waveform import (
     Complexes,
     Floats,
     channel_tones,
-    draw_tones,
+    draw_alphabet,
     evaluate_window,
     phasors,
     tone_bins,
@@ -67,16 +67,11 @@ class Codebook:
         secret = self._holding.channel_secret(epoch, scheme.channel_number(channel))
         first_axis = scheme.axis_index(channel)
         count = len(self.bins(channel))
-        amplitudes = np.empty((len(asked), len(channel.axes), count))
-        phases_rad = np.empty_like(amplitudes)
-        for row, symbol in enumerate(asked):
-            if not 0 <= symbol < scheme.alphabet_size:
-                raise MtmError(f"symbol {symbol} is outside the alphabet; choose 0 to {scheme.alphabet_size - 1}")
-            for axis in range(len(channel.axes)):
-                amplitudes[row, axis], phases_rad[row, axis] = draw_tones(
-                    secret, epoch, played, symbol, first_axis + axis, count
-                )
-        flat = phasors(amplitudes, phases_rad, scheme.power)
+        wrong = next((symbol for symbol in asked if not 0 <= symbol < scheme.alphabet_size), None)
+        if wrong is not None:
+            raise MtmError(f"symbol {wrong} is outside the alphabet; choose 0 to {scheme.alphabet_size - 1}")
+        axes = range(first_axis, first_axis + len(channel.axes))
+        flat = phasors(*draw_alphabet(secret, epoch, played, asked, axes, count), scheme.power)
         return flat if scheme.spectrum is None else flat * np.sqrt(self.tone_powers(channel))
 
     def samples(self, channel: Channel, window: int, symbols: Sequence[int] | None = None) -> Floats:

@@ -10,13 +10,14 @@ A spectrum multiplies each tone by sqrt(w_k), see `spectrum`. Samples of "ensemb
 """
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_onboard.protocol.keystream import stream
+from mtm_onboard.protocol.keystream import streams
 from mtm_onboard.protocol.scheme import Channel, Power, Scheme, count_bins
 from mtm_onboard.protocol.spectrum import tone_powers
 
@@ -49,10 +50,19 @@ def channel_tones(scheme: Scheme, channel: Channel) -> tuple[Floats, Floats]:
 
 def draw_tones(secret: bytes, epoch: int, window: int, symbol: int, axis: int, tones: int) -> tuple[Floats, Floats]:
     """Amplitudes A_k (Rayleigh) and phases phi_k (uniform, radians) of one waveform, each of shape (tones,)."""
-    data = stream(secret, "symbol", (epoch, window, symbol, axis), _BYTES_PER_TONE * tones)
-    words = np.frombuffer(data, dtype="<u8").reshape(tones, 2) >> np.uint64(11)
-    uniform = (words[:, 0].astype(np.float64) + 0.5) / 2.0**53
-    turns = words[:, 1].astype(np.float64) / 2.0**53
+    amplitudes, phases_rad = draw_alphabet(secret, epoch, window, [symbol], [axis], tones)
+    return amplitudes[0, 0], phases_rad[0, 0]
+
+
+def draw_alphabet(
+    secret: bytes, epoch: int, window: int, symbols: Sequence[int], axes: Sequence[int], tones: int
+) -> tuple[Floats, Floats]:
+    """Amplitudes and phases as of `draw_tones` for each symbol and axis: (symbols, axes, tones) each."""
+    places = ((epoch, window, symbol, axis) for symbol in symbols for axis in axes)
+    data = streams(secret, "symbol", places, _BYTES_PER_TONE * tones)
+    words = np.frombuffer(data, dtype="<u8").reshape(len(symbols), len(axes), tones, 2) >> np.uint64(11)
+    uniform = (words[..., 0].astype(np.float64) + 0.5) / 2.0**53
+    turns = words[..., 1].astype(np.float64) / 2.0**53
     return np.sqrt(-2.0 * np.log(uniform)), 2.0 * np.pi * turns
 
 

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mtm_audit.detectors.coherency import own_axes, rate_searched_scores
+from mtm_audit.detectors.matched.candidates import WindowTones
 from mtm_audit.detectors.matched.estimate import estimate, fit_recording_noise
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
-from mtm_audit.detectors.matched.windows import make_window, real_tones
+from mtm_audit.detectors.matched.windows import make_window
 from mtm_audit.model.glimpse import Glimpse
 from mtm_audit.model.timing import Timing
 from mtm_audit.model.track import Floats
@@ -83,7 +84,7 @@ def _matched(codebook: Codebook, seen: Sequence[ObservedShot], places: Sequence[
     motions: list[Motion] = []
     windows = []
     for channel, own in zip(scheme.channels, places, strict=True):
-        tones = real_tones(codebook, channel, 0)
+        tones = WindowTones(codebook, channel, 0)
         first = len(motions)
         glimpses = [_observed(scheme, channel, shot.glimpses[channel.body]) for shot in seen]
         motions += [uniform_motion(glimpse, scheme.band_hz[1]) for glimpse in glimpses]

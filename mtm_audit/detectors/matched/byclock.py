@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mtm_audit.detectors.matched.candidates import Tones
 from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
-from mtm_audit.detectors.matched.correlate import Heard, Tones
+from mtm_audit.detectors.matched.correlate import Heard
 from mtm_audit.detectors.matched.hypotheses import log_rate_prior
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.model.timing import OnsetRange, Timing

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mtm_audit.detectors.matched.correlate import Heard, Tones, template_power
+from mtm_audit.detectors.matched.candidates import WHOLE, Tones
+from mtm_audit.detectors.matched.correlate import Heard, template_power
 from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE
 from mtm_audit.model.track import Bools, Floats
 
@@ -21,6 +22,10 @@ _KEPT = 32
 _MOST_TOGETHER = 32_768
 # Windows times candidates of one product of matrices.
 _MOST_CORRELATED = 1 << 18
+# Windows times such candidates of one computation.
+_MOST_FEW = 1 << 15
+# Of a large alphabet so many candidates are looked at around each whole cell.
+_NEAR_A_CELL = 128
 
 
 @dataclass(frozen=True)
@@ -90,7 +95,8 @@ def _answer(heard: Heard, asked: Sequence[tuple[Sequence[Tones], _Seen]], step_s
         if id(seen) not in places:
             places[id(seen)] = _shifted(heard, seen.lags, step_s)
         place = places[id(seen)]
-        informations.append(_information(place, seen, tones))
+        looked_at = _information_of_few if count > WHOLE else _information
+        informations.append(looked_at(place, seen, tones))
         energy = place.weights[..., None] * template_power(tones[0], heard)
         # Every pair of an observed and an injected axis has a gain: (hypotheses, windows, pairs).
         energies.append(energy.reshape(*seen.lags.shape, observed * axes))
@@ -112,11 +118,13 @@ def _answer(heard: Heard, asked: Sequence[tuple[Sequence[Tones], _Seen]], step_s
 @dataclass(frozen=True)
 class _Shifted:
     """What was heard at given lags: `columns` (hypotheses, windows, observed axes, 2 K), and the `weights` of the cells
-    (hypotheses, windows, observed axes).
+    (hypotheses, windows, observed axes); taken from `heard` at `lags` (hypotheses, windows).
     """
 
     columns: NDArray[np.float32]
     weights: Floats
+    heard: Heard
+    lags: Floats
 
 
 def _shifted(heard: Heard, lags: Floats, step_s: float) -> _Shifted:
@@ -127,7 +135,8 @@ def _shifted(heard: Heard, lags: Floats, step_s: float) -> _Shifted:
     complex_heard = heard.projections[:, :tone_count] + 1j * heard.projections[:, tone_count:]
     turned = complex_heard[:, :, whole] * turn
     parts = np.concatenate([turned.real, turned.imag], axis=1).astype(np.float32)
-    return _Shifted(np.ascontiguousarray(parts.transpose(2, 3, 0, 1)), heard.seen[:, whole].transpose(1, 2, 0))
+    columns = np.ascontiguousarray(parts.transpose(2, 3, 0, 1))
+    return _Shifted(columns, heard.seen[:, whole].transpose(1, 2, 0), heard, lags)
 
 
 def _information(place: _Shifted, seen: _Seen, tones: Sequence[Tones]) -> NDArray[np.float32]:
@@ -149,6 +158,53 @@ def _information(place: _Shifted, seen: _Seen, tones: Sequence[Tones]) -> NDArra
                 strongest = np.argpartition(-np.sum(values**2, axis=2), kept, axis=1)[:, :kept]
                 values = np.take_along_axis(values, strongest[:, :, None], axis=1)
             result[rows[chunk], places[chunk]] = values
+    return result
+
+
+def _information_of_few(place: _Shifted, seen: _Seen, tones: Sequence[Tones]) -> NDArray[np.float32]:
+    """As `_information`, of the candidates alone that are strongest at the whole cells next to a window's lag.
+
+    Timings of one question lie close together, so that they share most cells. A candidate that is strong between two
+    cells is so at one of them; one that is missed would only have added evidence.
+    """
+    count, axes, width = tones[0].shape
+    hypotheses, windows, observed, _ = place.columns.shape
+    result = np.zeros((hypotheses, windows, _KEPT, observed * axes), dtype=np.float32)
+    own = seen.numbers % len(tones)
+    for number in np.unique(own[seen.inside]):
+        rows, places = np.nonzero((own == number) & seen.inside)
+        below = np.floor(place.lags[rows, places]).astype(np.int64)
+        cells, at = np.unique(np.stack([below, below + 1]), return_inverse=True)
+        near = _strongest_by_cell(place.heard, cells, tones[number])[at.reshape(2, -1)]
+        flat = tones[number].reshape(count, axes * width)
+        for chunk in np.array_split(np.arange(len(rows)), -(-len(rows) * 2 * _NEAR_A_CELL // _MOST_FEW)):
+            # One candidate may be near both cells: it must count once.
+            chosen = np.sort(np.concatenate([near[0, chunk], near[1, chunk]], axis=1), axis=1)
+            again = np.concatenate([np.zeros((len(chunk), 1), dtype=np.bool_), chosen[:, 1:] == chosen[:, :-1]], axis=1)
+            columns = place.columns[rows[chunk], places[chunk]]
+            few = flat[chosen].reshape(len(chunk), -1, width)
+            values = (few @ columns.transpose(0, 2, 1)).reshape(len(chunk), chosen.shape[1], axes, observed)
+            values = values.transpose(0, 1, 3, 2).reshape(len(chunk), chosen.shape[1], observed * axes)
+            strength = np.where(again, -1.0, np.sum(values**2, axis=2))
+            strongest = np.argpartition(-strength, _KEPT, axis=1)[:, :_KEPT]
+            result[rows[chunk], places[chunk]] = np.take_along_axis(values, strongest[:, :, None], axis=1)
+    return result
+
+
+def _strongest_by_cell(heard: Heard, cells: NDArray[np.int64], tones: Tones) -> NDArray[np.int64]:
+    """The candidates that correlate most with what was heard at whole lags, (cells, `_NEAR_A_CELL`)."""
+    count, axes, _ = tones.shape
+    columns = heard.projections[:, :, np.clip(cells, 0, heard.seen.shape[1] - 1)].transpose(0, 2, 1)
+    flat = [np.ascontiguousarray(tones[:, axis].T) for axis in range(axes)]
+    result = np.empty((len(cells), _NEAR_A_CELL), dtype=np.int64)
+    for chunk in np.array_split(np.arange(len(cells)), -(-len(cells) * count // _MOST_CORRELATED)):
+        strength = np.zeros((len(chunk), count), dtype=np.float32)
+        for row in columns[:, chunk]:
+            for own in flat:
+                correlated = row @ own
+                correlated *= correlated
+                strength += correlated
+        result[chunk] = np.argpartition(strength, count - _NEAR_A_CELL, axis=1)[:, -_NEAR_A_CELL:]
     return result
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from mtm_audit.detectors.matched.candidates import Tones
 from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, log_sum_exp
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import NoiseModel, power_response, whitened
@@ -15,8 +16,6 @@ from mtm_audit.detectors.matched.plants import MEMORY_S, TAIL_S, plant_family, t
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel
-
-Tones = NDArray[np.float32]
 
 # Candidates times lags of one computation.
 _MOST_CORRELATED = 1 << 19
@@ -110,12 +109,6 @@ def _moving_sum(values: Floats, cells: int) -> Floats:
     return difference
 
 
-def stacked_tones(codebook: Codebook, channel: Channel, number: int, symbols: Sequence[int] | None = None) -> Tones:
-    """Candidates' tones in the layout of `Heard.projections`, all unless `symbols` are named: (M, axes, 2 K)."""
-    tones = codebook.tones(channel, number, symbols)
-    return np.concatenate([tones.real, -tones.imag], axis=-1).astype(np.float32)
-
-
 def template_power(tones: Tones, heard: Heard) -> Floats:
     """Mean power of a candidate's whitened template in a fully seen cell, (observed axes, axes); candidates differ
     little.
@@ -130,30 +123,45 @@ def evidence_by_lag(tones: Sequence[Sequence[Tones]], heard: Heard) -> NDArray[n
     `tones` holds arrays (M, axes, 2 K), of as many windows for each codebook.
     """
     count, lags = len(tones[0][0]), heard.projections.shape[-1]
-    flat = [tone for numbered in tones for tone in numbered]
-    result = np.empty((len(flat), lags), dtype=np.float32)
+    sets, windows = len(tones), len(tones[0])
+    result = np.empty((sets * windows, lags), dtype=np.float32)
     together = max(1, _MOST_CORRELATED // (count * lags))
-    for first in range(0, len(flat), together):
-        result[first : first + together] = _evidence_of(np.stack(flat[first : first + together]), heard)
-    return result.reshape(len(tones), -1, lags)
+    for first in range(0, len(result), together):
+        several = range(first, min(first + together, len(result)))
+        result[first : several.stop] = _evidence_of([tones[row // windows][row % windows] for row in several], heard)
+    return result.reshape(sets, windows, lags)
 
 
-def _evidence_of(tones: Tones, heard: Heard) -> NDArray[np.float32]:
-    """The same for sets of waveforms (sets, M, axes, 2 K) to (sets, lags)."""
-    sets, count, axes, width = tones.shape
-    total = np.zeros((sets * count, heard.projections.shape[-1]), dtype=np.float32)
-    penalty = np.zeros((sets, total.shape[1]), dtype=np.float32)
-    powers = np.stack([template_power(tone, heard) for tone in tones])
+def _evidence_of(sets: Sequence[Tones], heard: Heard) -> NDArray[np.float32]:
+    """The same for sets of waveforms (M, axes, 2 K) each to (sets, lags)."""
     # Waveforms differ little in power, so that one scale serves all candidates of a set.
+    powers = np.stack([template_power(tones, heard) for tones in sets])
+    energy = (powers[..., None] * heard.seen[:, None]).astype(np.float32)
+    scales = np.float32(0.5 * GAIN_VARIANCE) / (1.0 + np.float32(GAIN_VARIANCE) * energy)
+    penalty = np.float32(0.5) * np.log1p(np.float32(GAIN_VARIANCE) * energy).sum(axis=(1, 2))
+    count, lags = len(sets[0]), heard.projections.shape[-1]
+    if len(sets) > 1 or count * lags <= _MOST_CORRELATED:
+        found = log_sum_exp(_explained(np.stack(sets), heard, scales), axis=1)
+    else:
+        # A large alphabet a block after the other, none of which leaves the processor's cache.
+        blocks = np.array_split(sets[0], -(-count * lags // _MOST_CORRELATED))
+        found = log_sum_exp(
+            np.stack([log_sum_exp(_explained(block[None], heard, scales), axis=1) for block in blocks]), axis=0
+        )
+    return np.asarray(found - np.float32(np.log(count)) - penalty)
+
+
+def _explained(tones: Tones, heard: Heard, scales: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What each candidate of sets (sets, M, axes, 2 K) explains of the motion at each lag, (sets, M, lags) nats;
+    `scales` (sets, observed axes, axes, lags).
+    """
+    sets, count, axes, width = tones.shape
+    total = np.zeros((sets, count, heard.projections.shape[-1]), dtype=np.float32)
     for axis in range(axes):
         flat = np.ascontiguousarray(tones[:, :, axis]).reshape(sets * count, width)
-        for row, (projection, seen) in enumerate(zip(heard.projections, heard.seen, strict=True)):
-            energy = (powers[:, row, axis, None] * seen).astype(np.float32)
-            correlation = flat @ projection
+        for row, projection in enumerate(heard.projections):
+            correlation = (flat @ projection).reshape(total.shape)
             correlation *= correlation
-            scale = np.float32(0.5 * GAIN_VARIANCE) / (1.0 + np.float32(GAIN_VARIANCE) * energy)
-            by_set = correlation.reshape(sets, count, -1)
-            by_set *= scale[:, None]
+            correlation *= scales[:, row, axis, None]
             total += correlation
-            penalty += np.float32(0.5) * np.log1p(np.float32(GAIN_VARIANCE) * energy)
-    return log_sum_exp(total.reshape(sets, count, -1), axis=1) - np.float32(np.log(count)) - penalty
+    return total

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import log_softmax, softmax
 
 from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, half_log_evidence, log_sum_exp
+from mtm_audit.detectors.matched.first_pass import first_pass
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import NoiseModel, fit_noise_by_axis, model_order
 from mtm_audit.detectors.matched.plants import COARSE, FINE
@@ -21,7 +22,6 @@ from mtm_audit.detectors.matched.windows import Statistics, Window, response_row
 from mtm_audit.model.track import Floats
 
 _ROUNDS = 3
-_KEPT = 64
 
 
 @dataclass
@@ -66,8 +66,7 @@ def estimate(
     `profile` is what is known of the robots' plant beforehand; without it all plants are equally likely.
     """
     prior, first_prior = log_prior(profile, FINE), log_prior(profile, COARSE)
-    judged = [_first_pass(window, motions[window.observation], noise, first_prior) for window in windows]
-    _keep_best(judged)
+    judged = _first_look(windows, motions, noise, first_prior)
     for _ in range(_ROUNDS):
         _believe(judged)
         found = _all_statistics(judged, motions, noise)
@@ -98,26 +97,22 @@ def _residuals(judged: Sequence[_Judged], motions: Sequence[Motion]) -> list[Flo
     return residuals
 
 
-def _first_pass(window: Window, motion: Motion, noise: NoiseModel, log_plants: Floats) -> _Judged:
-    found = statistics(window, window.tones, response_rows(window, COARSE), noise, motion.velocities)
-    axes = window.tones.shape[1]
-    gains = np.eye(axes) / GAIN_VARIANCE
-    evidence = half_log_evidence(gains + found.precision, found.information)
-    constant = found.information.shape[0] * 0.5 * axes * np.log(GAIN_VARIANCE)
-    alike = log_sum_exp(evidence.sum(axis=0) + log_plants, axis=1)
-    apart = log_sum_exp(evidence + log_plants, axis=2).sum(axis=0)
-    ratios = np.logaddexp(alike, apart) - np.log(2.0) - constant
-    silent = np.zeros((len(motion.velocities), window.last - window.first))
-    return _Judged(window, np.arange(len(ratios)), response_rows(window, FINE), ratios, ratios, ratios, silent)
-
-
-def _keep_best(judged: Sequence[_Judged]) -> None:
-    """Keep the candidates that look best over all repeats of a symbol."""
-    for members in _groups(judged):
-        total = np.sum([state.first_pass for state in members], axis=0)
-        kept = np.argsort(-total)[:_KEPT]
-        for state in members:
-            state.kept, state.ratios = kept, state.first_pass[kept]
+def _first_look(
+    windows: Sequence[Window], motions: Sequence[Motion], noise: NoiseModel, prior: Floats
+) -> list[_Judged]:
+    """Each window with the candidates that look best over all repeats of its symbol."""
+    groups: dict[tuple[int, int], list[int]] = {}
+    for index, window in enumerate(windows):
+        groups.setdefault((window.observation, window.group), []).append(index)
+    judged: dict[int, _Judged] = {}
+    for members in groups.values():
+        found = first_pass([windows[index] for index in members], motions, noise, prior)
+        for index, ratios in zip(members, found.ratios, strict=True):
+            window = windows[index]
+            silent = np.zeros((len(motions[window.observation].velocities), window.last - window.first))
+            kept = ratios[found.kept]
+            judged[index] = _Judged(window, found.kept, response_rows(window, FINE), kept, ratios, kept, silent)
+    return [judged[index] for index in range(len(windows))]
 
 
 def _groups(judged: Sequence[_Judged]) -> list[list[_Judged]]:
@@ -142,7 +137,7 @@ def _all_statistics(judged: Sequence[_Judged], motions: Sequence[Motion], noise:
         window = state.window
         own = residuals[window.observation].copy()
         own[:, window.first : window.last] += state.signal
-        found.append(statistics(window, window.tones[state.kept], state.rows, noise, own))
+        found.append(statistics(window, window.tones.of(state.kept), state.rows, noise, own))
     return found
 
 
@@ -218,7 +213,7 @@ def _under(data: Statistics, precision: Floats, information: Floats, prior: Floa
 
 def _expect_signals(judged: Sequence[_Judged], hypotheses: Sequence[list[_Hypothesis]], noise: NoiseModel) -> None:
     for state, alternatives in zip(judged, hypotheses, strict=True):
-        tones = np.einsum("l,lak->ak", state.belief, state.window.tones[state.kept])
+        tones = np.einsum("l,lak->ak", state.belief, state.window.tones.of(state.kept))
         heard = np.einsum("ak,pkn->pan", tones, state.rows)
         weights = softmax([float(log_sum_exp(item.ratios, axis=0)) for item in alternatives])
         gains = sum(

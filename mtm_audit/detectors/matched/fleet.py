@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mtm_audit.detectors.matched.byclock import Found
+from mtm_audit.detectors.matched.candidates import LazyTones, Tones
 from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
-from mtm_audit.detectors.matched.correlate import Prepared, Tones, hear, stacked_tones
+from mtm_audit.detectors.matched.correlate import Prepared, hear
 from mtm_audit.detectors.matched.hypotheses import log_rate_prior
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.search import candidate_rates, lead_cells, waveform_sets
@@ -104,7 +105,7 @@ def _weigh(
     scheme, channel, motion = codebooks[0].scheme, member.channel, member.prepared.motion
     lead, windows = lead_cells(scheme, channel, motion, onset), waveform_sets(scheme, channel, motion, onset)
     ticks, from_onset = scheme.window_ticks(channel), isinstance(onset, int | float)
-    tones = [[stacked_tones(codebook, channel, number) for number in range(windows)] for codebook in codebooks]
+    tones = [LazyTones(codebook, channel, windows) for codebook in codebooks]
     result: list[Floats] = [np.empty((len(nears), len(nears[0].rates_hz))) for nears in offered]
     for coarse_hz in sorted({near.coarse_hz for nears in offered for near in nears}):
         heard = hear(member.prepared, codebooks[0], channel, coarse_hz, lead)

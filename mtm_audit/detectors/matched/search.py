@@ -13,8 +13,9 @@ from typing import TypeVar
 import numpy as np
 
 from mtm_audit.detectors.matched.byclock import Found, Place, starts_by_clock
+from mtm_audit.detectors.matched.candidates import WHOLE, LazyTones, Tones
 from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
-from mtm_audit.detectors.matched.correlate import Heard, Prepared, Tones, evidence_by_lag, hear, stacked_tones
+from mtm_audit.detectors.matched.correlate import Heard, Prepared, evidence_by_lag, hear
 from mtm_audit.detectors.matched.hypotheses import Grid, Hypothesis, fold, make_grid
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.model.timing import Onset, OnsetRange, Timing
@@ -30,6 +31,8 @@ _WEIGHED = 64
 _USUAL_STARTS = 128
 _USUAL_RATES = 0.03
 _PLAIN_NATS = 20.0
+# Of the distance between coarse rates; half of it is where the next one's begin.
+_NEAR_NOMINAL = 0.25
 _HALF_CELLS = np.arange(-3, 4) / 2.0
 # How much later than the typical plant a robot may follow, where its onset is known.
 _LATER_S = np.array([0.0, 0.1, 0.2])
@@ -41,6 +44,7 @@ class _Candidate:
 
     coarse: int
     hypothesis: Hypothesis
+    rate_hz: float
 
 
 # What all codebooks share at one coarse rate, by its number.
@@ -102,11 +106,12 @@ def search_timings(
         rates_hz = rates_hz[near] if near.sum() > 1 else rates_hz[len(rates_hz) // 2 - 1 : len(rates_hz) // 2 + 2]
     lead = lead_cells(scheme, channel, motion, onset)
     windows = waveform_sets(scheme, channel, motion, onset)
-    tones = [[stacked_tones(book, one, number) for number in range(windows)] for book, one in played]
+    tones = [LazyTones(book, one, windows) for book, one in played]
     if isinstance(onset, OnsetRange):
         heard = hear(prepared, codebook, channel, scheme.rate_hz, lead)
         return starts_by_clock(heard, Place(motion, lead, ticks, scheme.rate_hz), tones, onset, progress)
     spacing = float(rates_hz[1] - rates_hz[0]) / scheme.rate_hz
+    rates = _Rates(len(rates_hz), spacing, scheme.rate_hz)
 
     def place(coarse: int) -> tuple[Heard, Grid]:
         rate_hz = float(rates_hz[coarse])
@@ -118,14 +123,13 @@ def search_timings(
             progress(fraction)
 
     if isinstance(onset, int | float):
-        return _delays_and_rates(place, len(rates_hz), spacing, tones, motion, lead, report)
-    return _onsets_and_rates(place, len(rates_hz), spacing, tones, motion, lead, report)
+        return _delays_and_rates(place, rates, tones, motion, lead, report)
+    return _onsets_and_rates(place, rates, tones, motion, lead, report)
 
 
 def _delays_and_rates(
     place: _Place,
-    rates: int,
-    spacing: float,
+    rates: "_Rates",
     tones: Sequence[Sequence[Tones]],
     motion: Motion,
     lead: int,
@@ -134,9 +138,9 @@ def _delays_and_rates(
     """Only the rate is open, and how late the robot follows: all can be weighed with one set of gains."""
     best = _usual_first(
         rates,
-        spacing,
-        lambda some: _best_delays(place, some, tones, motion, lead, report),
-        lambda each: (each[0].evidence, each[1]),
+        lambda some, _: _best_delays(place, some, tones, motion, lead, report),
+        lambda each: _Told(each[0].evidence, each[1], each[0].timing.rate_hz),
+        _is_large(tones),
     )
     return [_closer(place, coarse, each, tones[number], motion, lead) for number, (each, coarse) in enumerate(best)]
 
@@ -160,37 +164,75 @@ def _best_delays(
     return best
 
 
+@dataclass(frozen=True)
+class _Rates:
+    """The coarse rates: `count` of them, the nominal one in the middle, relative `spacing` apart."""
+
+    count: int
+    spacing: float
+    nominal_hz: float
+
+    @property
+    def middle(self) -> int:
+        """The number of the nominal rate."""
+        return self.count // 2
+
+    def by_use(self) -> tuple[list[int], list[int]]:
+        """The numbers of the rates that usual clocks have, and of the others."""
+        usual = [at for at in range(self.count) if abs(at - self.middle) * self.spacing <= _USUAL_RATES]
+        return usual, [at for at in range(self.count) if at not in usual]
+
+
+@dataclass(frozen=True)
+class _Told:
+    """A result's evidence, its coarse rate's number and its rate."""
+
+    evidence: float
+    coarse: int
+    rate_hz: float
+
+
+def _is_large(tones: Sequence[Sequence[Tones]]) -> bool:
+    return len(tones[0][0]) > WHOLE
+
+
 def _usual_first(
-    rates: int,
-    spacing: float,
-    best_at: Callable[[Sequence[int]], list[_Best]],
-    told: Callable[[_Best], tuple[float, int]],
+    rates: _Rates,
+    best_at: Callable[[Sequence[int], int], list[_Best]],
+    told: Callable[[_Best], _Told],
+    large: bool,
 ) -> list[_Best]:
     """The best of each channel at the coarse rates of usual clocks, and where one does not stand out there, at all.
 
-    `told` gives the evidence of a result and its coarse rate.
+    A `large` alphabet, which costs most to look for, is looked for at the nominal rate before that, where it peaks.
     """
-    usual, others = _by_use(rates, spacing)
-    best = best_at(usual)
-    if others and not _plain([told(each) for each in best], rates, spacing):
-        best = [max(pair, key=lambda each: told(each)[0]) for pair in zip(best, best_at(others), strict=True)]
+    if large:
+        best = best_at([rates.middle], 0)
+        if _plain_at_nominal([told(each) for each in best], rates):
+            return best
+    usual, others = rates.by_use()
+    best = best_at(usual, _USUAL_STARTS)
+    if others and not _plain([told(each) for each in best], rates):
+        best = [
+            max(pair, key=lambda each: told(each).evidence)
+            for pair in zip(best, best_at(others, _USUAL_STARTS), strict=True)
+        ]
     return best
 
 
-def _by_use(rates: int, spacing: float) -> tuple[list[int], list[int]]:
-    """The coarse rates that usual clocks have, and the others."""
-    middle = rates // 2
-    usual = [coarse for coarse in range(rates) if abs(coarse - middle) * spacing <= _USUAL_RATES]
-    return usual, [coarse for coarse in range(rates) if coarse not in usual]
+def _plain_at_nominal(best: Sequence[_Told], rates: _Rates) -> bool:
+    """Whether every message stands out near the nominal rate, clear of what the next coarse rate would show better."""
+    far = _NEAR_NOMINAL * rates.spacing
+    return all(one.evidence > _PLAIN_NATS and abs(one.rate_hz / rates.nominal_hz - 1.0) <= far for one in best)
 
 
-def _plain(best: Sequence[tuple[float, int]], rates: int, spacing: float) -> bool:
+def _plain(best: Sequence[_Told], rates: _Rates) -> bool:
     """Whether every message stands out well inside the usual rates: clocks are seldom far off, and then others cannot
     do better.
     """
-    middle = rates // 2
     return all(
-        evidence > _PLAIN_NATS and abs(coarse - middle) * spacing <= 0.5 * _USUAL_RATES for evidence, coarse in best
+        one.evidence > _PLAIN_NATS and abs(one.coarse - rates.middle) * rates.spacing <= 0.5 * _USUAL_RATES
+        for one in best
     )
 
 
@@ -207,8 +249,7 @@ def _closer(place: _Place, coarse: int, found: Found, tones: Sequence[Tones], mo
 
 def _onsets_and_rates(
     place: _Place,
-    rates: int,
-    spacing: float,
+    rates: "_Rates",
     tones: Sequence[Sequence[Tones]],
     motion: Motion,
     lead: int,
@@ -216,9 +257,9 @@ def _onsets_and_rates(
 ) -> list[Found]:
     best = _usual_first(
         rates,
-        spacing,
-        lambda some: _best_of_rates(place, some, tones, motion, report),
-        lambda each: (each[0], each[1].coarse),
+        lambda some, usual: _best_of_rates(place, some, usual, tones, motion, report),
+        lambda each: _Told(each[0], each[1].coarse, each[1].rate_hz),
+        _is_large(tones),
     )
     found_at: dict[int, Found] = {}
     winning = sorted({winner.coarse for _, winner in best})
@@ -233,16 +274,19 @@ def _onsets_and_rates(
 
 
 def _best_of_rates(
-    place: _Place, rates: Sequence[int], tones: Sequence[Sequence[Tones]], motion: Motion, report: _Report
+    place: _Place, rates: Sequence[int], usual: int, tones: Sequence[Sequence[Tones]], motion: Motion, report: _Report
 ) -> list[tuple[float, _Candidate]]:
-    """The best hypothesis of each channel at some coarse rates, with its coherent evidence."""
+    """The best hypothesis of each channel at some coarse rates, with its coherent evidence.
+
+    `usual` starts are weighed whatever they look like.
+    """
     candidates: list[list[_Candidate]] = [[] for _ in tones]
     for done, coarse in enumerate(rates):
         report(0.5 * done / len(rates))
         heard, grid = place(coarse)
-        for number, peaks in enumerate(fold(evidence_by_lag(tones, heard), grid, _PEAKS_PER_RATE, _USUAL_STARTS)):
-            candidates[number] += [_Candidate(coarse, peak) for peak in peaks]
-    chosen = [sorted(found, key=lambda item: -item.hypothesis.evidence)[: _WEIGHED + _USUAL_STARTS]
+        for number, peaks in enumerate(fold(evidence_by_lag(tones, heard), grid, _PEAKS_PER_RATE, usual)):
+            candidates[number] += [_Candidate(coarse, peak, float(grid.rates_hz[peak.rate])) for peak in peaks]
+    chosen = [sorted(found, key=lambda item: -item.hypothesis.evidence)[: _WEIGHED + usual]
               for found in candidates]  # fmt: skip
     best = [(-np.inf, found[0]) for found in chosen]
     for coarse in sorted({item.coarse for found in chosen for item in found}):

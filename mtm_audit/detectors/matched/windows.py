@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mtm_audit.detectors.matched.candidates import WindowTones
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import NoiseModel, whitened
 from mtm_audit.detectors.matched.plants import TAIL_S, Plants, tone_responses
@@ -23,8 +25,8 @@ class Window:
 
     `observation` numbers the observation, `number` the window from the onset on, `group` is shared by the windows
     that repeat the same symbol. `first` and `last` bound the cells that hear the window (its tail included);
-    `since_start_s` (n,) are their middles. `tones` (M, axes, 2 K): real and imaginary parts of the candidates' tones,
-    so that a waveform is `tones` times the rows of `Responses.rows`.
+    `since_start_s` (n,) are their middles. `tones` are the candidates', so that a waveform is `tones.of` it times the
+    rows of `response_rows`.
     """
 
     observation: int
@@ -35,7 +37,7 @@ class Window:
     since_start_s: Floats
     length_s: float
     tones_hz: Floats
-    tones: Floats
+    tones: WindowTones
 
 
 @dataclass(frozen=True)
@@ -73,11 +75,11 @@ def make_window(
     observation: int,
     number: int,
     group: int,
-    tones: Floats | None = None,
+    tones: WindowTones | None = None,
 ) -> Window:
     """The window that begins `number` window lengths after the onset; it may lie partly outside the recording.
 
-    `tones` are its `real_tones` where they are at hand.
+    `tones` are its candidates' where they are at hand.
     """
     ticks = codebook.scheme.window_ticks(channel)
     length_s = ticks / timing.rate_hz
@@ -93,14 +95,8 @@ def make_window(
         middles_s[first:last] - start_s,
         length_s,
         codebook.bins(channel) * (timing.rate_hz / ticks),
-        real_tones(codebook, channel, number) if tones is None else tones,
+        WindowTones(codebook, channel, number) if tones is None else tones,
     )
-
-
-def real_tones(codebook: Codebook, channel: Channel, number: int) -> Floats:
-    """Real and imaginary parts of all candidates' tones, side by side: (M, axes, 2 K)."""
-    tones = codebook.tones(channel, number)
-    return np.concatenate([tones.real, tones.imag], axis=-1)
 
 
 def response_rows(window: Window, plants: Plants) -> Floats:
@@ -114,23 +110,16 @@ def statistics(window: Window, tones: Floats, rows: Floats, noise: NoiseModel, r
 
     `residual` is the observed motion less what all other windows are believed to add.
     """
-    order, filters = noise.order, noise.filters[window.observation]
-    before = max(0, window.first - order)
-    observed = whitened(residual[:, before : window.last], filters)
-    scales = noise.scales[window.observation]
-    weights = noise.weights[window.observation][:, before + order : window.last]
+    pulled, weights, filters, history = pulled_by(window, noise, residual)
     count, axes, width = tones.shape
     flat = tones.reshape(count * axes, width)
-    pulled = weights / scales[:, None] * observed
     information = np.empty((len(pulled), count, len(rows), axes))
     precision = np.empty((len(pulled), count, len(rows), axes, axes))
     few = len(flat) <= width
     # Few candidates are cheapest as waveforms, many as quadratic forms of their tones; either way what is fewer is
     # whitened, once for all axes whose filter is the same.
     signals = flat @ rows if few else rows
-    for own in np.unique(filters, axis=0):
-        mine = np.flatnonzero(np.all(filters == own, axis=1))
-        heard = _whitened_from_start(signals, window.first - before, own)
+    for mine, heard in whitened_by_filter(signals, filters, history):
         found = (
             _from_waveforms(heard.reshape(len(rows), count, axes, -1), pulled[mine], weights[mine])
             if few
@@ -138,6 +127,26 @@ def statistics(window: Window, tones: Floats, rows: Floats, noise: NoiseModel, r
         )
         information[mine], precision[mine] = found.information, found.precision
     return Statistics(information, precision)
+
+
+def pulled_by(window: Window, noise: NoiseModel, residual: Floats) -> tuple[Floats, Floats, Floats, int]:
+    """What templates of a window are correlated with: the whitened residual in units of the noise and times its
+    weights, and those weights, (observed axes, n) each; the whitening filters; how many cells of history they have.
+    """
+    order, filters = noise.order, noise.filters[window.observation]
+    before = max(0, window.first - order)
+    observed = whitened(residual[:, before : window.last], filters)
+    scales = noise.scales[window.observation]
+    weights = noise.weights[window.observation][:, before + order : window.last]
+    return weights / scales[:, None] * observed, weights, filters, window.first - before
+
+
+def whitened_by_filter(signals: Floats, filters: Floats, history: int) -> list[tuple[NDArray[np.int64], Floats]]:
+    """Signals whitened from silence, once for each filter and the observed axes that have it."""
+    return [
+        (np.flatnonzero(np.all(filters == own, axis=1)), _whitened_from_start(signals, history, own))
+        for own in np.unique(filters, axis=0)
+    ]
 
 
 def _whitened_from_start(signals: Floats, history: int, whitening_filter: Floats) -> Floats:

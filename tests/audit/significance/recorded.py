@@ -6,7 +6,8 @@ from functools import cache
 import numpy as np
 
 from mtm_audit.detectors.base import ChannelReading, Reading
-from mtm_audit.detectors.matched.correlate import Prepared, prepare, stacked_tones
+from mtm_audit.detectors.matched.candidates import stacked_tones
+from mtm_audit.detectors.matched.correlate import Prepared, prepare
 from mtm_audit.detectors.matched.estimate import fit_recording_noise
 from mtm_audit.detectors.matched.motion import uniform_motion
 from mtm_audit.model.glimpse import glimpse_of_track

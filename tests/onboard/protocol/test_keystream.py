@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mtm_onboard.protocol.keystream import SECRET_BYTES, stream
+from mtm_onboard.protocol.keystream import SECRET_BYTES, stream, streams
 
 FAKE_SECRET = b"not a real secret, only for test"
 words = st.integers(0, 2**64 - 1)
@@ -24,6 +24,12 @@ def test_the_first_bytes_of_a_stream_are_these():
 @given(st.integers(0, 300))
 def test_a_longer_stream_begins_with_the_shorter_one(size):
     assert stream(FAKE_SECRET, "symbol", (7,), 300)[:size] == stream(FAKE_SECRET, "symbol", (7,), size)
+
+
+@given(st.lists(st.lists(words, max_size=4).map(tuple), max_size=4), st.integers(0, 40))
+def test_many_streams_are_each_stream_in_turn(places, size):
+    alone = [stream(FAKE_SECRET, "symbol", place, size) for place in places]
+    assert streams(FAKE_SECRET, "symbol", places, size) == b"".join(alone)
 
 
 @given(st.lists(words, max_size=5), st.lists(words, max_size=5))

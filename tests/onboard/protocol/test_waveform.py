@@ -10,7 +10,15 @@ from hypothesis import strategies as st
 
 from mtm_onboard.protocol.keystream import stream
 from mtm_onboard.protocol.scheme import count_bins, shortest_window
-from mtm_onboard.protocol.waveform import draw_tones, evaluate, evaluate_window, phasors, tone_basis, tone_bins
+from mtm_onboard.protocol.waveform import (
+    draw_alphabet,
+    draw_tones,
+    evaluate,
+    evaluate_window,
+    phasors,
+    tone_basis,
+    tone_bins,
+)
 
 VECTORS = json.loads((Path(__file__).parent / "waveform_v1.json").read_text())
 
@@ -127,11 +135,20 @@ def test_a_late_tick_has_the_phase_of_its_place_in_the_window():
 
 
 def test_a_stream_of_zeros_is_the_loudest_tone_there_is(monkeypatch):
-    monkeypatch.setattr("mtm_onboard.protocol.waveform.stream", lambda *asked: bytes(asked[-1]))
+    monkeypatch.setattr("mtm_onboard.protocol.waveform.streams", lambda *asked: bytes(asked[-1]))
     amplitudes, phases_rad = draw_tones(bytes(32), 0, 0, 0, 0, 3)
     # The middle of the first of 2 ** 53 steps.
     assert amplitudes == pytest.approx([np.sqrt(2.0 * 54.0 * np.log(2.0))] * 3)
     assert phases_rad.tolist() == [0.0] * 3
+
+
+def test_an_alphabet_drawn_at_once_is_each_symbol_by_itself():
+    symbols, axes = (7, 0, 65_535), (1, 2)
+    amplitudes, phases_rad = draw_alphabet(bytes(32), 3, 11, symbols, axes, 13)
+    for row, symbol in enumerate(symbols):
+        for column, axis in enumerate(axes):
+            alone = draw_tones(bytes(32), 3, 11, symbol, axis, 13)
+            assert np.array_equal([amplitudes[row, column], phases_rad[row, column]], alone)
 
 
 def test_many_windows_at_once_are_each_window_by_itself():

@@ -59,10 +59,10 @@ def test_gains_are_those_of_weighted_least_squares(candidates):
     motion = motion_of(100)
     noise, window = noise_of(motion), window_of(motion)
     rows = response_rows(window, COARSE)
-    found = statistics(window, window.tones[:candidates], rows, noise, motion.velocities)
+    found = statistics(window, window.tones.of(np.arange(candidates)), rows, noise, motion.velocities)
     plant, candidate, axis = 5, candidates - 1, 1
     padded = np.zeros((2, 100))
-    padded[:, window.first : window.last] = window.tones[candidate] @ rows[plant]
+    padded[:, window.first : window.last] = window.tones.of(np.array([candidate]))[0] @ rows[plant]
     filters = noise.filters[0]
     template, observed = whitened(padded, filters[axis]), whitened(motion.velocities, filters)
     inside = slice(window.first - noise.order, window.last - noise.order)
@@ -79,9 +79,9 @@ def test_the_planted_candidate_has_most_information():
     rows = response_rows(window, COARSE)
     velocities = 1e-3 * motion.velocities
     mixing = np.array([[0.8, -0.6], [0.6, 0.8]])
-    velocities[:, window.first : window.last] += mixing @ (window.tones[3] @ rows[4])
+    velocities[:, window.first : window.last] += mixing @ (window.tones.of(np.array([3]))[0] @ rows[4])
     noise = NoiseModel((np.array([[1.0, 0.0]] * 2),), (np.ones(2),), (np.ones((2, 120)),))
-    found = statistics(window, window.tones, rows, noise, velocities)
+    found = statistics(window, window.tones.of(np.arange(len(window.tones))), rows, noise, velocities)
     gains = np.linalg.solve(found.precision[:, 3, 4], found.information[:, 3, 4][..., None])[..., 0]
     assert gains == pytest.approx(mixing, abs=0.01)
 
@@ -93,7 +93,9 @@ def test_tones_and_rows_make_the_waveform_at_a_perfect_plant():
     basis = np.concatenate([np.cos(2 * np.pi * turns), -np.sin(2 * np.pi * turns)])
     played = KEY.codebook().samples(CHANNEL, 0)[:, :, :50:2]
     # Cells of two ticks: the middle of a cell is a whole number of ticks after the start.
-    at_ticks = (window.tones @ basis)[:, :, np.isclose(window.since_start_s * 50.0 % 2.0, 0.0)]
+    at_ticks = (window.tones.of(np.arange(len(window.tones))) @ basis)[
+        :, :, np.isclose(window.since_start_s * 50.0 % 2.0, 0.0)
+    ]
     assert at_ticks[:, :, : played.shape[2]] == pytest.approx(played[:, :, : at_ticks.shape[2]])
 
 
@@ -128,5 +130,6 @@ def test_windows_made_together_are_those_made_one_by_one(schedule):
     for window in together:
         alone = make_window(codebook, channel, motion, timing, 3, window.number, window.group)
         assert (window.observation, window.first, window.last) == (3, alone.first, alone.last)
-        assert np.array_equal(window.tones, alone.tones)
+        every = np.arange(len(window.tones))
+        assert np.array_equal(window.tones.of(every), alone.tones.of(every))
     assert (together[0].tones is together[1].tones) == (schedule == "fixed")
