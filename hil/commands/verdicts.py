@@ -23,7 +23,6 @@ from hil.experiments.verdicts.sure import PLANTS, SureSummary, decode_sent, summ
 from hil.experiments.verdicts.thresholds import THRESHOLDS
 from hil.experiments.verdicts.validity import (
     LEVELS,
-    RECORDINGS,
     ValiditySummary,
     decode_under_keys,
     summarise_validity,
@@ -72,19 +71,21 @@ def known_names(asked: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:
     return names
 
 
-def validity(options: VerdictOptions, console: Console) -> None:
-    """Measure, print and, where asked, write how p-values and e-values are spread under keys that nobody played."""
+def validity(options: VerdictOptions, recordings: int, console: Console) -> None:
+    """Measure, print and, where asked, write how p-values and e-values are spread under keys that nobody played, on so
+    many recordings of every kind.
+    """
     rows: list[Row] = []
     everything: list[Values] = []
     kinds = options.names or tuple(KINDS)
     with CellStore(options.cells) as store:
         for kind in kinds:
-            asked = validity_cells(kind, options.count, options.seed)
+            asked = validity_cells(kind, recordings, options.count, options.seed)
             results = run_sweep(decode_under_keys, asked, store, console, options.workers)
             everything += results
-            rows += _validity_rows(summarise_validity(kind, results), RECORDINGS)
-    rows += _validity_rows(summarise_validity("all", everything), RECORDINGS * len(kinds))
-    _write("validity", options, _VALIDITY_COLUMNS, rows)
+            rows += _validity_rows(summarise_validity(kind, results), recordings)
+    rows += _validity_rows(summarise_validity("all", everything), recordings * len(kinds))
+    _write("validity", options, _VALIDITY_COLUMNS, rows, asked=f" --recordings {recordings}")
 
 
 def sure(options: VerdictOptions, console: Console) -> None:
@@ -193,11 +194,17 @@ def _interval(successes: int, trials: int) -> tuple[float, float]:
 
 
 def _write(
-    arm: str, options: VerdictOptions, columns: Sequence[str], rows: Sequence[Row], notes: Sequence[str] = ()
+    arm: str,
+    options: VerdictOptions,
+    columns: Sequence[str],
+    rows: Sequence[Row],
+    notes: Sequence[str] = (),
+    asked: str = "",
 ) -> None:
+    """`asked` are options of this arm alone, as the command line says them."""
     if options.out is None:
         return
     only = "".join(f' --only "{name}"' for name in options.names)
-    command = f"mtm-hil verdicts {arm} -n {options.count}{only} --seed {options.seed} --out {options.out}"
+    command = f"mtm-hil verdicts {arm} -n {options.count}{asked}{only} --seed {options.seed} --out {options.out}"
     write_result_csv(options.out, command, columns, rows, notes)
     print(f"wrote {options.out}")

@@ -15,9 +15,8 @@ _FIRST_SEED = 700_000
 @verdicts.command("validity")
 def _validity(
     *,
-    keys: Annotated[
-        int, typer.Option("-n", metavar="N", min=1, help="Keys on each of ten recordings of every kind.")
-    ] = 2000,
+    keys: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Keys on each recording.")] = 2000,
+    recordings: Annotated[int, typer.Option(metavar="N", min=1, help="Recordings of every kind.")] = 2,
     only: Annotated[list[str] | None, typer.Option(metavar="KIND", help="This kind alone; may be repeated.")] = None,
     seed: FirstSeed = _FIRST_SEED,
     workers: Workers = None,
@@ -30,7 +29,8 @@ def _validity(
         from hil.commands.verdicts import VerdictOptions, known_names, validity
         from hil.experiments.verdicts.hostile import KINDS
 
-        validity(VerdictOptions(keys, known_names(only or (), KINDS), seed, workers, out, cells), console)
+        options = VerdictOptions(keys, known_names(only or (), KINDS), seed, workers, out, cells)
+        validity(options, recordings, console)
 
 
 @verdicts.command("sure")

@@ -211,7 +211,8 @@ class _Reader:
             [part.terms for part in weighed],
             [part.cost for part in weighed],
             scheme.message_symbols,
-            symbols=scheme.framing is None,
+            # A frame's symbols have a check of their own, and where nothing speaks for a message no threshold is met.
+            symbols_above_nats=0.0 if scheme.framing is None else math.inf,
         )
 
     def in_doubt(self, readings: Readings) -> list[str]:

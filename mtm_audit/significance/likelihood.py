@@ -54,25 +54,36 @@ def approximate_log_e(
 def _approximate(
     projections: Projections, tones: Floats, levels: Levels, turns: Floats, timings: Integers, plants: Integers
 ) -> Floats:
-    count = projections.power.shape[-1]
-    power = np.tile(projections.power[plants], 2)
-    factors = np.tile(precision_factors(levels, projections.power[plants].mean(axis=1), projections.cells), 2)
-    linear = projections.linear[timings, plants]
-    seen = projections.seen[timings]
+    power, seen = projections.power[plants], projections.seen[timings]
+    count = power.shape[-1]
+    factors = precision_factors(levels, power.mean(axis=1), projections.cells)
     magnitudes = levels.magnitudes[:, None, None, None]
     unit = 0.5 * magnitudes**2 * factors[:, :, None] * power
-    quadratic = unit[:, :, None] * seen[None, ..., None]
-    weighted = factors[:, :, None, None] * linear
-    found = np.einsum("lpgok,gcak->lpgoac", weighted, tones, optimize=True)
-    spent = np.einsum("lpok,gcak->lpgoac", unit, tones**2, optimize=True) * seen[None, ..., None, None]
-    scaled = weighted / np.sqrt(count + quadratic) * magnitudes[..., None]
-    moments = np.einsum("lpgok,lpgqk->lpgoq", scaled, scaled, optimize=True)
-    squared = turns**2
-    aligned = np.einsum("roa,lpgoac->lprgc", turns, found, optimize=True) * magnitudes[..., None]
-    aligned -= 0.5 * np.einsum("roa,lpgoac->lprgc", squared, spent, optimize=True)
-    curved = 0.5 * np.einsum("roa,rqa,lpgoq->lprg", turns, turns, moments, optimize=True)
-    curved -= 0.5 * np.einsum("roa,lpgo->lprg", squared, np.log1p(quadratic / count).sum(axis=-1), optimize=True)
-    return np.asarray((aligned - curved[..., None]).transpose(1, 0, 2, 3, 4))
+    quadratic = unit[:, :, None] * seen[..., None]
+    weighted = magnitudes[..., None] * np.tile(factors, 2)[:, :, None, None] * projections.linear[timings, plants]
+    found = np.einsum("lpgok,gcak->lpoagc", weighted, tones, optimize=True)
+    squares = tones[..., :count] ** 2 + tones[..., count:] ** 2
+    spent = np.einsum("lpok,gcak->lpoagc", unit, squares, optimize=True)
+    spent *= seen.transpose(0, 2, 1)[:, :, None, :, None]
+    # Real and imaginary parts have one weight.
+    spent -= 2.0 * np.log1p(quadratic / count).sum(axis=-1).transpose(0, 1, 3, 2)[:, :, :, None, :, None]
+    scaled = weighted / np.sqrt(count + np.tile(quadratic, 2))
+    moments = np.einsum("lpgok,lpgqk->lpoqg", scaled, scaled, optimize=True)
+    return _turned(turns, found, spent, moments)
+
+
+def _turned(turns: Floats, found: Floats, spent: Floats, moments: Floats) -> Floats:
+    """Values (pairs, levels, orientations, groups, candidates) of every orientation: one product with all that depends
+    on none, `found` and `spent` (levels, pairs, observed axes, injected axes, groups, candidates), `moments` (levels,
+    pairs, observed axes, observed axes, groups).
+    """
+    levels, pairs, *_, groups, candidates = found.shape
+    crossed = np.einsum("roa,rqa->roq", turns, turns)
+    rows = [part.reshape(len(turns), -1) for part in (turns, -0.5 * turns**2, -0.5 * crossed)]
+    spread = np.broadcast_to(moments[..., None], (*moments.shape, candidates))
+    columns = [part.reshape(levels, pairs, -1, groups * candidates) for part in (found, spent, spread)]
+    table = np.concatenate(rows, axis=1) @ np.concatenate(columns, axis=2)
+    return np.asarray(table.reshape(levels, pairs, len(turns), groups, candidates).swapaxes(0, 1))
 
 
 def log_e(

@@ -7,6 +7,7 @@ and so the terms may be chosen in any way. Two mixtures are made: `presence`, an
 docs/evidence.md has the theorem, and what is random and what is fixed in it.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,7 +20,7 @@ from mtm_audit.significance.weighed_channel import WeighedChannel, weighed
 @dataclass(frozen=True)
 class MessageEvidence:
     """`presence_nats`: log e-value of any message of the key; `channels_nats`: of each channel by itself, by its name;
-    `symbols`: by message position, None where no channel shows it.
+    `symbols`: by message position, None where no channel shows it or it was not weighed.
     """
 
     presence_nats: float
@@ -34,22 +35,22 @@ class MessageEvidence:
 
 
 def weigh_message(
-    channels: Sequence[ChannelTerms], costs: Sequence[float], positions: int, *, symbols: bool = True
+    channels: Sequence[ChannelTerms], costs: Sequence[float], positions: int, *, symbols_above_nats: float = -math.inf
 ) -> MessageEvidence:
     """What the channels that could be read say together of a message of so many positions.
 
     Channels of one name are parts of one, the one that shows most first. `costs` are log prior probabilities of the
-    track that was chosen for each. Without `symbols` only presence is weighed: a frame's symbols have a check of their
-    own.
+    track that was chosen for each. Symbols are weighed where presence is more than `symbols_above_nats`.
     """
     own = [weighed(channel, cost) for channel, cost in zip(channels, costs, strict=True)]
     parts: dict[str, list[WeighedChannel]] = {}
     for item in own:
         parts.setdefault(item.channel.name, []).append(item)
+    nats = {name: channel_nats(each) for name, each in parts.items()}
+    present = presence(list(parts.values()), list(nats.values()))
     found: list[SymbolEvidence | None] = [None] * positions
-    for position in range(positions if symbols else 0):
+    for position in range(positions if present > symbols_above_nats else 0):
         showing = [row for row, channel in enumerate(channels) if position in channel.shown]
         if showing:
             found[position] = weigh_symbol(own, showing, position)
-    nats = {name: channel_nats(each) for name, each in parts.items()}
-    return MessageEvidence(presence(list(parts.values()), list(nats.values())), nats, tuple(found))
+    return MessageEvidence(present, nats, tuple(found))

@@ -10,12 +10,18 @@ from hil.fleet.sending import STEP_S, Sending
 from hil.plants.family import ROBOMASTER
 from hil.plants.responses import Floats, lag
 from hil.worlds.vehicles import VEHICLES
+from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.track import FARTHEST, Track
 from mtm_onboard.protocol import Channel, Codebook, Scheme
-from mtm_onboard.protocol.scheme import Power
+from mtm_onboard.protocol.scheme import Power, Schedule
+from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.protocol.waveform import tone_bins
 
-_ALPHABET, _TICKS, _BAND_HZ, _RATE_HZ, _SIGMA = 4, 200, (0.5, 5.0), 50.0, 0.1
+_ALPHABET, _WINDOW_TICKS, _BAND_HZ, _RATE_HZ, _SIGMA = 4, 100, (0.5, 5.0), 50.0, 0.1
+# Two messages of one symbol, or one of two; evidence costs by the window and by the second.
+_SHORTEST_S, _LONGEST_S = 4.6, 5.6
+# Under a rolling schedule: about when recordings begin, and by how much clocks may be off.
+_UNIX_S, _CLOCK_ERROR_S = 1.75e9, 1.5
 _CROWD = 100
 # A slope in the band and a faint tone at its edge.
 _SPECTRUM = ((0.5, -20.0), (0.75, 6.0), (5.0, -6.0))
@@ -23,11 +29,15 @@ _SPECTRUM = ((0.5, -20.0), (0.75, 6.0), (5.0, -6.0))
 
 @dataclass(frozen=True)
 class Recording:
-    """What is asked of each key: `tracks` to be read under `scheme`, from `onset_s` on (None: at an unknown time)."""
+    """What is asked of each key: `tracks` to be read under `scheme`, from `onset_s` on (None: at an unknown time).
+
+    `at` says when a recording under a rolling schedule was made.
+    """
 
     tracks: tuple[Track, ...]
     scheme: Scheme
     onset_s: float | None
+    at: RecordedAt | None
 
 
 # A recording's scheme and the source of all its randomness to its tracks.
@@ -37,23 +47,36 @@ _Maker = Callable[[Scheme, np.random.Generator], Sequence[Track]]
 def hostile_recording(kind: str, number: int, seed: int) -> Recording:
     """The recording of that kind and number, the same for the same seed.
 
-    Even ones are read from a known onset; of each two, four and eight in turn others have the sphere's law or the
-    normal one and one or two symbols a message, and from the eighth on their noise has a spectrum.
+    Even ones are read from a known onset. Sixteen that follow each other, the kinds' first ones two apart, have each
+    law of the tones, each schedule, and one and two symbols a message; every third one's noise has a spectrum.
     """
-    draw = np.random.default_rng([seed, list(KINDS).index(kind), number])
-    power: Power = "window" if number // 2 % 2 == 0 else "ensemble"
+    row = list(KINDS).index(kind)
+    draw = np.random.default_rng([seed, row, number])
+    turn = 2 * row + number
+    power: Power = "window" if turn // 2 % 2 == 0 else "ensemble"
+    schedule: Schedule = "fixed" if turn // 4 % 2 == 0 else "rolling"
+    symbols = 1 + turn // 8 % 2
     maker, robots = KINDS[kind]
-    symbols = 1 + number // 4 % 2
-    names = [f"robot{row}" for row in range(robots)]
+    names = [f"robot{robot}" for robot in range(robots)]
     channels = tuple(Channel(name, name, ("vx", "vy"), symbols, _SIGMA) for name in names)
-    scheme = Scheme(name="hostile", rate_hz=_RATE_HZ, band_hz=_BAND_HZ, alphabet_size=_ALPHABET, message_ticks=_TICKS,
-                    channels=channels, power=power, spectrum=_SPECTRUM if number >= 8 else None)  # fmt: skip
+    scheme = Scheme(name="hostile", rate_hz=_RATE_HZ, band_hz=_BAND_HZ, alphabet_size=_ALPHABET,
+                    message_ticks=symbols * _WINDOW_TICKS, channels=channels, power=power,
+                    schedule=schedule, spectrum=_SPECTRUM if turn % 3 == 2 else None)  # fmt: skip
     known_s = float(draw.uniform(0.0, 1.0))
-    return Recording(tuple(maker(scheme, draw)), scheme, known_s if number % 2 == 0 else None)
+    onset_s = known_s if number % 2 == 0 else None
+    return Recording(tuple(maker(scheme, draw)), scheme, onset_s, _recorded_at(scheme, onset_s))
+
+
+def _recorded_at(scheme: Scheme, onset_s: float | None) -> RecordedAt | None:
+    """So that a slot begins at a known onset; at an unknown one at some time that is known to a second or two."""
+    if scheme.schedule == "fixed":
+        return None
+    slot = next_slot(_UNIX_S, scheme)
+    return RecordedAt(slot_start_unix_s(slot, scheme) - (onset_s or 0.0), _CLOCK_ERROR_S)
 
 
 def _times_s(draw: np.random.Generator) -> Floats:
-    return np.arange(round(float(draw.uniform(5.2, 7.0)) / STEP_S), dtype=np.float64) * STEP_S
+    return np.arange(round(float(draw.uniform(_SHORTEST_S, _LONGEST_S)) / STEP_S), dtype=np.float64) * STEP_S
 
 
 def _track(times_s: Floats, positions: Floats) -> Track:
@@ -75,7 +98,7 @@ def _sine(_scheme: Scheme, draw: np.random.Generator) -> list[Track]:
 def _comb(_scheme: Scheme, draw: np.random.Generator) -> list[Track]:
     """Every tone that a waveform may have, all alike loud."""
     times_s = _times_s(draw)
-    tones_hz = tone_bins(_TICKS, _RATE_HZ, _BAND_HZ) * (_RATE_HZ / _TICKS)
+    tones_hz = tone_bins(_WINDOW_TICKS, _RATE_HZ, _BAND_HZ) * (_RATE_HZ / _WINDOW_TICKS)
     turns = times_s[:, None, None] * tones_hz + draw.uniform(0.0, 1.0, (2, len(tones_hz)))
     velocities = 0.1 * np.cos(2.0 * np.pi * turns).sum(axis=-1)
     return [_track(times_s, np.cumsum(velocities, axis=0) * STEP_S)]
@@ -134,7 +157,7 @@ def _another_key(scheme: Scheme, draw: np.random.Generator) -> list[Track]:
     for channel in scheme.channels:
         symbols = tuple(int(symbol) for symbol in draw.integers(0, _ALPHABET, channel.symbols))
         sending = _sending(secret, scheme, channel, symbols, onset_s=0.5)
-        seconds = 5.2 if len(scheme.channels) > 1 else float(draw.uniform(5.2, 7.0))
+        seconds = _SHORTEST_S if len(scheme.channels) > 1 else float(draw.uniform(_SHORTEST_S, _LONGEST_S))
         tracks.append(sent_track(channel.body, VEHICLES[ROBOMASTER], [sending], seconds, draw))
     return tracks
 

@@ -18,7 +18,6 @@ from mtm_audit.decoding.settings import DecodeSettings
 from mtm_onboard.protocol import Key, MtmError
 
 LEVELS = (0.1, 0.01, 0.001)
-RECORDINGS = 10
 _STREAM, _RECORDING_STREAM = 702, 703
 _KEYS_A_CELL = 50
 
@@ -28,7 +27,7 @@ class ValiditySummary:
     """Keys on recordings of one kind: `keys` read, `refused` those of which nothing could be read, `below` how many
     p-values are at most each of `LEVELS`, `not_finite` evidence that is no number. `mean_e` is the mean e-value of any
     message with its standard error, `mean_symbol_e` that of the best symbol of a position, divided by the number of
-    symbols; neither should exceed 1.
+    symbols and 0 where presence is so small that symbols are not weighed; neither should exceed 1.
     """
 
     kind: str
@@ -45,10 +44,10 @@ class ValiditySummary:
     most_bits: float
 
 
-def validity_cells(kind: str, keys: int, first_seed: int) -> list[Cell]:
-    """All recordings of a kind with `keys` keys each."""
+def validity_cells(kind: str, recordings: int, keys: int, first_seed: int) -> list[Cell]:
+    """So many recordings of a kind with `keys` keys each."""
     cells = []
-    for number in range(RECORDINGS):
+    for number in range(recordings):
         for place, first in enumerate(range(0, keys, _KEYS_A_CELL)):
             count = min(_KEYS_A_CELL, keys - first)
             parameters: Values = {"kind": kind, "recording": number, "world": first_seed, "keys": count}
@@ -61,7 +60,7 @@ def decode_under_keys(parameters: Values, seed: int) -> dict[str, Scalar]:
     kind, number = str(parameters["kind"]), int(parameters["recording"])
     recording = _recording(kind, number, int(parameters["world"]))
     draw = np.random.default_rng([_STREAM, list(KINDS).index(kind), number, seed])
-    settings = DecodeSettings(onset_s=recording.onset_s)
+    settings = DecodeSettings(onset_s=recording.onset_s, at=recording.at)
     p_values: list[float] = []
     nats: list[float] = []
     symbol_nats: list[float] = []
@@ -75,17 +74,17 @@ def decode_under_keys(parameters: Values, seed: int) -> dict[str, Scalar]:
             continue
         p_values.append(decoding.evidence.p_value)
         nats.append(math.nan if decoding.evidence.nats is None else decoding.evidence.nats)
-        symbol_nats += [math.nan if value is None else value for value in decoding.symbol_nats]
+        symbol_nats += [-math.inf if value is None else value for value in decoding.symbol_nats]
         verdicts.append(decoding.verdict)
     finite = np.isfinite(nats)
     e_values = np.exp(np.array(nats)[finite])
-    symbol_e_values = np.exp(np.array(symbol_nats)[np.isfinite(symbol_nats)]) / recording.scheme.alphabet_size
+    symbol_e_values = np.exp(np.array(symbol_nats)[~np.isnan(symbol_nats)]) / recording.scheme.alphabet_size
     return {
         "keys": len(nats),
         "refused": refused,
         "decoded": verdicts.count("decoded"),
         "inconclusive": verdicts.count("inconclusive"),
-        "not_finite": int(np.sum(~finite) + np.sum(~np.isfinite(symbol_nats))),
+        "not_finite": int(np.sum(~finite) + np.sum(np.isnan(symbol_nats) | np.isposinf(symbol_nats))),
         **{f"p <= {level:g}": int(np.sum(np.array(p_values) <= level)) for level in LEVELS},
         "sum_e": float(e_values.sum()),
         "sum_e_squared": float((e_values**2).sum()),

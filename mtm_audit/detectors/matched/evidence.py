@@ -40,9 +40,13 @@ def half_log_evidence(precision: Floats, information: Floats) -> Floats:
 def log_sum_exp(values: Floats, axis: int) -> Floats:
     """log(sum(exp(values))) along an axis, without overflow; minus infinity where nothing is larger.
 
-    As scipy's, in a third of the time: tables have millions of entries.
+    As scipy's, in a fraction of the time: tables have millions of entries, and numpy reduces a short last axis in many
+    small steps.
     """
-    top = np.maximum(np.max(values, axis=axis, keepdims=True), np.finfo(values.dtype).min)
+    first = np.array(np.moveaxis(values, axis, 0), order="C")
+    top = np.maximum(np.max(first, axis=0), np.finfo(values.dtype).min)
+    first -= top
+    np.exp(first, out=first)
     with np.errstate(divide="ignore"):
-        result: Floats = np.squeeze(top, axis=axis) + np.log(np.sum(np.exp(values - top), axis=axis))
+        result: Floats = top + np.log(np.sum(first, axis=0))
     return result

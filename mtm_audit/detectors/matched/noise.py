@@ -131,7 +131,8 @@ def fit_noise_by_axis(signals: Sequence[Floats], seen: Sequence[Bools], order: i
 
 def _doubted(errors: Floats, weights: Floats, usable: Bools, order: int) -> tuple[Floats, Floats]:
     """Scales (axes,) and weights (axes, n) of innovations (axes, n - order) by a Student-t law."""
-    padded = np.pad(errors, ((0, 0), (order, 0)))
+    padded = np.zeros_like(weights)
+    padded[:, order:] = errors
     variances = np.sum(weights * padded**2, axis=1) / max(1.0, float(usable.sum()))
     variances = np.maximum(variances, 1e-24)
     doubt = (_DEGREES_OF_FREEDOM + 1.0) / (_DEGREES_OF_FREEDOM + padded**2 / variances[:, None])

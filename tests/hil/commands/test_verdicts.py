@@ -18,11 +18,11 @@ def quick(tmp_path, arm, count=1):
 def test_validity_writes_a_row_for_each_level_and_one_kind_alone(tmp_path, capsys):
     assert run(*quick(tmp_path, "validity"), "--only", "sine") == 0
     first, second, _, *rows = (tmp_path / "a.csv").read_text().splitlines()
-    assert first == f'# mtm-hil verdicts validity -n 1 --only "sine" --seed 5 --out {tmp_path}/a.csv'
+    assert first == f'# mtm-hil verdicts validity -n 1 --recordings 2 --only "sine" --seed 5 --out {tmp_path}/a.csv'
     assert second == f"# code {code_fingerprint()}"
     assert [row.split(",")[0] for row in rows] == ["sine"] * 3 + ["all"] * 3
-    assert "10 keys on 10 recordings" in capsys.readouterr().out
-    assert len((tmp_path / "cells.jsonl").read_text().splitlines()) == 10
+    assert "2 keys on 2 recordings" in capsys.readouterr().out
+    assert len((tmp_path / "cells.jsonl").read_text().splitlines()) == 2
 
 
 def test_sure_goes_on_from_the_cells_that_are_finished(tmp_path, capsys, monkeypatch):
