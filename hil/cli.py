@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -97,6 +98,13 @@ def record(
         ),
     ] = None,
     key: KeyFile = None,
+    anchor: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A fleet's anchor, on whose public channel --disclosed is played."),
+    ] = None,
+    disclosed: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="With --anchor: the disclosed key of a day that is over.")
+    ] = None,
     wire: Annotated[WireName, typer.Option(help="CAN, plaintext or MAVLink protocol, or no wire.")] = WireName.CAN,
     seed: WorldSeed = 0,
     plant: Annotated[
@@ -128,10 +136,15 @@ def record(
 ) -> None:
     """Record simulated robots that play any key: motion capture, video, and what was sent."""
     with reported_console() as console:
-        content = content_of(message, text, hexadecimal, no_message)
+        if anchor is None and disclosed is None:
+            content = content_of(message, text, hexadecimal, no_message)
+        elif anchor is None or disclosed is None or key or realtime or no_message or message or text or hexadecimal:
+            raise typer.BadParameter("give --anchor and --disclosed together, and no key, message or --realtime beside")
+        else:
+            content = None
         from math import radians
 
-        from hil.commands.record import RecordOptions
+        from hil.commands.record import RecordOptions, carried
         from hil.commands.record import record as run
         from hil.sensors.camera_motion import CameraMotion
 
@@ -153,6 +166,7 @@ def record(
                 floor=floor.value,
                 plant=plant,
                 robots=robots,
+                carried=None if anchor is None or disclosed is None else carried(anchor, disclosed),
             ),
             console,
         )

@@ -69,14 +69,18 @@ def decode(
         list[Path],
         typer.Argument(metavar="PATH", help="Videos, logs, motion-capture files, or a folder of those or of pictures."),
     ],
-    key: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The key file, unless --anchor and --disclosed are given.")
-    ] = None,
+    key: Annotated[Path | None, typer.Option(metavar="FILE", help="The key file, unless --anchor is given.")] = None,
     anchor: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="A fleet's public anchor, to verify with a disclosed key.")
+        Path | None,
+        typer.Option(metavar="FILE", help="A fleet's public anchor: alone, to read its public channel (docs/keys.md)."),
     ] = None,
     disclosed: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The disclosed key of the day on which the film was made.")
+        Path | None,
+        typer.Option(metavar="FILE", help="With --anchor: the disclosed key of the day on which the film was made."),
+    ] = None,
+    write_disclosed: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the disclosed key that the public channel carries, in a new file."),
     ] = None,
     onset: Annotated[
         str, typer.Option(metavar="SECONDS|auto", help="When the message begins, in the recording's own time.")
@@ -175,8 +179,10 @@ def decode(
     """  # fmt: skip
     if search_speed and speed is not None:
         raise typer.BadParameter("is given; leave it or --search-speed out", param_hint="--speed")
-    if (key is None) == (anchor is None and disclosed is None) or (anchor is None) != (disclosed is None):
-        raise typer.BadParameter("give a key file, or else an anchor and a disclosed key", param_hint="--key")
+    if (key is None) == (anchor is None) or (disclosed is not None and anchor is None):
+        raise typer.BadParameter("give a key file, or else an anchor with a disclosed key or alone", param_hint="--key")
+    if write_disclosed is not None and (anchor is None or disclosed is not None):
+        raise typer.BadParameter("is read on the public channel; give --anchor alone", param_hint="--write-disclosed")
     onset_s, pairs, times = _onset_s(onset), _pairs(assign or []), [] if at is None else at.split(",")
     began_unix_s = [_unix_s(text.strip()) for text in times]
     if len(began_unix_s) > 1 and not together:
@@ -215,6 +221,7 @@ def decode(
                 reading=reading, frame_rate_hz=frame_rate, speed=played, overlay=overlay_files(overlay, sheet),
                 report=None if report is None else requested(report, context.find_root().obj, inputs), force=force,
                 together=together, each_at=tuple(began) if together else (), given=given,
+                write_disclosed=write_disclosed,
             )
         )  # fmt: skip
     raise typer.Exit(code)

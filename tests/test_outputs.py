@@ -33,6 +33,8 @@ ALSO = {
     "mtm-onboard issue": ["--auditor", "--first-day", str(DAY), "--days", "1"],
     "mtm-onboard disclose": ["--allow-unsynchronised"], "mtm-onboard export": ["--message", "1"],
 }  # fmt: skip
+# Where an option goes with another than the command usually has.
+ALSO_WITH = {("mtm-audit decode", "--write-disclosed"): ["--anchor", "{folder}/in.key"]}
 REFUSAL = r"is a key file|was not made by|exists already|is no finished cell|is no revocation list|is no folder"
 
 
@@ -54,7 +56,8 @@ def folder(tmp_path, monkeypatch):
 
 def line_with(command: Command, option: str, path, folder) -> list[str]:
     """What must be given so that the command runs, and the option."""
-    words = [word.format(folder=folder) for word in ALSO.get(command.name, ())]
+    also = ALSO_WITH.get((command.name, option), ALSO.get(command.name, ()))
+    words = [word.format(folder=folder) for word in also]
     for own in command.parameters:
         if own.is_required and own.name != option and own.name not in words:
             value = VALUES.get(own.name)

@@ -119,6 +119,21 @@ def messages(
         run(rollouts, seed, workers, out, cells, console)
 
 
+def disclosures(
+    rollouts: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Films of each kind.")] = 10,
+    seed: FirstSeed = 700_000,
+    workers: Workers = None,
+    out: OutCsv = None,
+    force: Force = False,
+    cells: Cells = CELLS_FOLDER / "disclosures.jsonl",
+) -> None:
+    """Count how often a day's key is recovered from the motion of a later day's robots, by who has the anchor."""
+    with reported_console("mtm-hil disclosures", out, force=force) as console:
+        from hil.commands.disclosures import disclosures as run
+
+        run(rollouts, seed, workers, out, cells, console)
+
+
 def cameras(
     rollouts: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Runs that each camera films.")] = 2,
     seed: CellSeed = 900_000,
@@ -441,6 +456,6 @@ def endurance(
 
 # In the order in which --help lists them.
 EXPERIMENTS: tuple[Callable[..., None], ...] = (
-    calibrate, bench, cameras, false_alarms, messages, frames, shim, robustness, sweep, real, identify, faults, fuzz,
-    forgeries, attacks, endurance,
+    calibrate, bench, cameras, false_alarms, messages, disclosures, frames, shim, robustness, sweep, real, identify,
+    faults, fuzz, forgeries, attacks, endurance,
 )  # fmt: skip

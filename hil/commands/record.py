@@ -24,7 +24,9 @@ from hil.sensors.film_qualities import FILM_QUALITIES
 from hil.worlds.robomaster import MOST_ROBOTS, ROBOTS, tagged_scheme
 from hil.worlds.vehicles import arena_task, vehicle
 from mtm_onboard.protocol import Key, Scheme, generate_key, load_key, save_key
+from mtm_onboard.protocol.disclosure import load_anchor, load_disclosed
 from mtm_onboard.protocol.errors import WrongValueError
+from mtm_onboard.protocol.public_channel import link_to_carry, public_key
 from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.runtime.message import Content, message_of
 
@@ -44,7 +46,8 @@ class RecordOptions:
     many as the key has bodies, `key` None makes a key, `camera` None films nothing, `quality` None keeps the film
     nearly as the camera saw it, and `plant` is the kind of the robots. `realtime` runs the onboard programs on UARTs
     when `wire` is plaintext, over UDP when it is MAVLink and on serial CAN adapters otherwise. `motion` None is a
-    camera on a stand; `floor` is one of `FLOORS`.
+    camera on a stand; `floor` is one of `FLOORS`. `carried` is the public channel's key and the disclosed one that it
+    plays, in the place of `key` and `content`.
     """
 
     out: Path
@@ -60,13 +63,22 @@ class RecordOptions:
     floor: str = "mat"
     plant: str = ROBOMASTER
     robots: int | None = None
+    carried: tuple[Key, bytes] | None = None
+
+
+def carried(anchor: Path, disclosed: Path) -> tuple[Key, bytes]:
+    """What robots play who carry a disclosed key; raises MtmError when it may not be public yet, or is none."""
+    chain = load_anchor(anchor)
+    return public_key(chain), link_to_carry(chain, load_disclosed(disclosed, chain), datetime.now(UTC))
 
 
 def record(options: RecordOptions, console: Console) -> None:
     """Write the recording folder, whole or not at all; raises MtmError when it exists or an option does not fit."""
     check_new(options.out)
+    if options.carried is not None:
+        options = replace(options, content=options.carried[1])
     work, chassis = arena_task(options.plant), _chassis(options.plant)
-    key = generate_key("hil", _scheme(options)) if options.key is None else load_key(options.key)
+    key = _key(options)
     sensors = Sensors(
         camera=None if options.camera is None else replace(CAMERAS[options.camera], motion=options.motion),
         quality=None if options.quality is None else FILM_QUALITIES[options.quality],
@@ -87,7 +99,7 @@ def record(options: RecordOptions, console: Console) -> None:
         robots=options.robots,
     )
     with new_folder(options.out) as folder:
-        if options.key is None:
+        if _makes_key(options):
             save_key(key, folder / KEY_NAME)
         if options.realtime:
             (folder / "onboard").mkdir()
@@ -101,6 +113,16 @@ def record(options: RecordOptions, console: Console) -> None:
     _print_summary(options, settings)
     if options.realtime:
         console.print(_robots_table(result.robots))
+
+
+def _makes_key(options: RecordOptions) -> bool:
+    return options.key is None and options.carried is None
+
+
+def _key(options: RecordOptions) -> Key:
+    if options.carried is not None:
+        return options.carried[0]
+    return generate_key("hil", _scheme(options)) if options.key is None else load_key(options.key)
 
 
 def _scheme(options: RecordOptions) -> Scheme:
@@ -164,7 +186,7 @@ def _print_summary(options: RecordOptions, settings: RunSettings) -> None:
     whole_s = settings.onset_s + scheme.message_ticks / scheme.rate_hz
     if message is not None and settings.seconds < whole_s:
         print(f"the message is cut off; it takes --seconds {math.ceil(10.0 * whole_s) / 10.0:g} to record it once")
-    if options.key is None:
+    if _makes_key(options):
         print(f"the key is {options.out / KEY_NAME}; keep it secret")
 
 

@@ -11,6 +11,7 @@ unit in either joint, is 10 in 50 steps.
 
 from collections.abc import Iterator, Sequence
 from importlib import resources
+from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -34,13 +35,21 @@ _RESET_RADPS = 0.005
 _START, _NOISE = 0, 1
 
 
+class Policy(Protocol):
+    """What drives the arm: a Gaussian over actions before the squashing by tanh."""
+
+    def distribution(self, observations: Floats) -> tuple[Floats, Floats]:
+        """Means and standard deviations, (n, 2) each, for observations (n, 10); asked once a tick."""
+        ...
+
+
 class Reacher:
     """The arm; goals are eight targets on a ring, counter-clockwise from +x.
 
     States are inner and outer joint angle (rad) and the target's x and y (m). The policy is Gaussian: on an axis that
     has no keyed noise in a whole rollout, its eps is drawn white from the seed. In a rollout's control history `base`
     is tanh(mean), `requested` is mean + std * eps, and `applied` is tanh of that: nothing is clamped, but large actions
-    are squashed towards 1, full torque.
+    are squashed towards 1, full torque. `policy` None is the one that was trained.
     """
 
     name = "reacher"
@@ -51,11 +60,11 @@ class Reacher:
     task_ticks = 50
     picture_px = (480, 480)
 
-    def __init__(self) -> None:
+    def __init__(self, policy: Policy | None = None) -> None:
         text = resources.files("gymnasium").joinpath("envs/mujoco/assets/reacher.xml").read_text()
         self._model = mujoco.MjModel.from_xml_string(text)
         self._bodies = [self._model.body(name).id for name in ("fingertip", "target")]
-        self._policy = trained_policy()
+        self._policy: Policy = trained_policy() if policy is None else policy
 
     def run(self, goals: Integers, noise: Floats, seeds: Sequence[int]) -> list[Rollout]:
         """One rollout of one shot for each seed, from a pose of the seed to one target after the other.

@@ -33,7 +33,8 @@ from mtm_audit.reporting.remarks import remarks
 from mtm_audit.reporting.report.provenance import ReportRequest
 from mtm_audit.reporting.stages import Stage, stages_of_decoding, stages_of_recording, text_of_stages
 from mtm_audit.reporting.text import print_report
-from mtm_onboard.protocol.output_file import check_outputs
+from mtm_onboard.protocol.disclosure import save_disclosed
+from mtm_onboard.protocol.output_file import check_new_file, check_outputs
 
 EXIT_CODES = {"decoded": 0, "absent": 3, "inconclusive": 4}
 
@@ -45,7 +46,8 @@ class DecodeOptions:
     `frame_rate_hz` replaces the times of films; `speed` is how many times as fast the recording is played, None to
     search for it. `overlay` is what to draw over the film; `report` None writes no page. With `together` all recordings
     show one message; `each_at` says when each was made, empty where the files do. `given` are the names of options that
-    were given and may not matter, see `unused_options`.
+    were given and may not matter, see `unused_options`. `write_disclosed` is where to write the key that the public
+    channel carries.
     """
 
     paths: tuple[Path, ...]
@@ -65,6 +67,7 @@ class DecodeOptions:
     together: bool = False
     each_at: tuple[RecordedAt, ...] = ()
     given: frozenset[str] = frozenset()
+    write_disclosed: Path | None = None
 
 
 def run_decode(options: DecodeOptions) -> int:
@@ -90,7 +93,8 @@ def run_decode(options: DecodeOptions) -> int:
         return code
     if len(sources) > 1:
         report = ("--report",) if options.report else ()
-        single = (*(("--plot",) if options.plot else ()), *report)
+        written = ("--write-disclosed",) if options.write_disclosed else ()
+        single = (*(("--plot",) if options.plot else ()), *report, *written)
         return run_each(sources, single, options.as_json, lambda source: _report(options, opened, source, stages[:1]))
     text, code = _report(options, opened, sources[0], stages)
     sys.stdout.write(text)
@@ -102,6 +106,8 @@ def _check(options: DecodeOptions) -> None:
     check_decode_values(options.settings, options.tracker, options.speed, options.frame_rate_hz)
     page = None if options.report is None else options.report.path
     check_outputs("mtm-audit decode", options.plot, page, *options.overlay.paths, force=options.force)
+    if options.write_disclosed is not None:
+        check_new_file(options.write_disclosed)
     if options.plot is not None:
         from mtm_audit.reporting.plot import check_plot_path
 
@@ -212,7 +218,8 @@ def _publish(
 ) -> str:
     """Draw and write what is to be drawn; returns what is to be printed."""
     warnings = (*remarks(recording, decoding), *opened.warnings)
-    basis = opened.basis(recording, decoding, stated=options.settings.at is not None)
+    carried = opened.carried(decoding)
+    basis = opened.basis(recording, decoding, carried, stated=options.settings.at is not None)
     if options.plot is not None:
         from mtm_audit.reporting.plot import draw_plot
 
@@ -226,6 +233,8 @@ def _publish(
             options.report, recording, decoding, warnings=warnings, basis=basis,
             stages=[*stages, *stages_of_decoding(decoding)], tracker=options.tracker,
         )  # fmt: skip
+    if options.write_disclosed is not None and carried is not None:
+        save_disclosed(carried, options.write_disclosed)
     if options.as_json:
         return json_report(recording, decoding, warnings, basis)
     console = answer_console()

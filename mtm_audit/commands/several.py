@@ -18,7 +18,7 @@ def run_each(
     the `single` options is given, each of which shows one recording.
     """
     if single:
-        raise MtmError(f"{single[0]} draws one recording, and {len(sources)} are named; name one")
+        raise MtmError(f"{single[0]} is of one recording, and {len(sources)} are named; name one")
     codes: list[int] = []
     texts: list[str] = []
     for source in sources:

@@ -178,7 +178,7 @@ def _report(watch: Watch, opened: OpenedKey, source: Source, answer: str) -> tup
     decoding: Decoding = best.decoding
     kind: Kind = "video" if source.is_film else "motion capture"
     recording = Recording((Path(source.shown),), kind, best.tracks, best.warnings, watch.at)
-    basis = opened.basis(recording, decoding, stated=True)
+    basis = opened.basis(recording, decoding, None, stated=True)
     console = answer_console()
     with console.capture() as captured:
         print_report(console, recording, decoding, (*remarks(recording, decoding), *opened.warnings), basis)

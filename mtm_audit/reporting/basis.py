@@ -6,11 +6,13 @@ from datetime import UTC, datetime
 
 from mtm_audit.decoding.decoding import Decoding
 from mtm_onboard.protocol.holding import Grant
+from mtm_onboard.protocol.key import Key
 
 FIXED = (
     "The key's schedule is fixed: an old motion of these robots, or one put together from parts of several, would read "
     "the same."
 )
+_PUBLIC = "This is the public channel: everybody who has the anchor can read it, and play it as well."
 
 
 @dataclass(frozen=True)
@@ -33,10 +35,17 @@ class Basis:
     authenticates: bool = True
 
 
-def basis_of(decoding: Decoding, grant: Grant | None, disclosure: Disclosure | None) -> Basis:
-    """What the verdict of a decoding rests on; nothing without a message."""
+def basis_of(
+    decoding: Decoding, grant: Grant | None, disclosure: Disclosure | None, carried: Key | None = None
+) -> Basis:
+    """What the verdict of a decoding rests on; nothing without a message.
+
+    `carried` is the disclosed key that the public channel was found to carry.
+    """
     if decoding.verdict == "absent":
         return Basis()
+    if grant is not None and grant.kind == "public":
+        return Basis((_PUBLIC, *_carried(carried)))
     sentences, authenticates = [], True
     if decoding.scheme.schedule == "fixed":
         sentences.append(FIXED)
@@ -60,6 +69,16 @@ def basis_of(decoding: Decoding, grant: Grant | None, disclosure: Disclosure | N
             "made this motion."
         )
     return Basis(tuple(sentences), authenticates)
+
+
+def _carried(carried: Key | None) -> tuple[str, ...]:
+    grant = None if carried is None else carried.holding.grant
+    if grant is None:
+        return ()
+    return (
+        f"It carries the disclosed key of {grant.first_day}: the anchor confirms it, whoever played it. With it "
+        "everybody can verify films of that day, and from then on make such motions as well.",
+    )
 
 
 def _holders(grant: Grant) -> str:

@@ -3,17 +3,27 @@
 import argparse
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mtm_onboard.commands.contentoptions import add_content, content
+
+if TYPE_CHECKING:
+    from mtm_onboard.protocol import Key
+    from mtm_onboard.runtime.message import Content
 
 
 def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command and its options."""
     parser = subparsers.add_parser("run", help="drive the robot: base commands in, base commands and message out")
     parser.add_argument("--config", required=True, type=Path, metavar="FILE", help="the robot's configuration (TOML)")
-    parser.add_argument("--key", required=True, type=Path, metavar="FILE", help="the key file")
-    add_content(parser).add_argument(
-        "--no-message", action="store_true", help="no noise until mtm-onboard send gives a message"
+    parser.add_argument("--key", type=Path, metavar="FILE", help="the key file, unless --anchor is given")
+    what = add_content(parser)
+    what.add_argument("--no-message", action="store_true", help="no noise until mtm-onboard send gives a message")
+    what.add_argument(
+        "--disclosed", type=Path, metavar="FILE", help="with --anchor: the key of a day that is over, for everybody"
+    )
+    parser.add_argument(
+        "--anchor", type=Path, metavar="FILE", help="the fleet's anchor, on whose public channel --disclosed is played"
     )
     parser.add_argument("--no-repeat", action="store_true", help="send the message once, then base commands alone")
     parser.add_argument(
@@ -32,31 +42,59 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="rolling schedule: follow this computer's clock although nobody keeps it right, as in a lab",
     )  # fmt: skip
     parser.add_argument("--revoked", type=Path, metavar="FILE", help="the list that mtm-onboard revoke keeps")
-    parser.set_defaults(handler=_run)
+    parser.set_defaults(handler=_run, usage_error=parser.error)
 
 
 def _run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from mtm_onboard.control.session import Plan, run_session
-    from mtm_onboard.protocol import load_key
     from mtm_onboard.protocol.revocation import load_revocations
     from mtm_onboard.runtime.config import SourceSettings, load_config
     from mtm_onboard.runtime.ending_signals import ending_signals
 
-    config, key = load_config(args.config), load_key(args.key)
+    if (args.anchor is None) != (args.disclosed is None) or (args.anchor is None) == (args.key is None):
+        args.usage_error("give a key with a message, or else an anchor with a disclosed key")
+    config = load_config(args.config)
+    key, said = _carried(args) if args.key is None else _asked(args)
     if args.stdin:
         config = replace(config, source=SourceSettings("stdin"))
     if args.revoked is not None:
         load_revocations(args.revoked).check(key)
     plan = Plan(
-        None if args.no_message else content(args), not args.no_repeat, args.start_at, args.duration,
+        said, not args.no_repeat, args.start_at, args.duration,
         args.allow_unsynchronised,
     )  # fmt: skip
     with ending_signals() as asked_to_end:
         outcome = run_session(config, key, plan, asked_to_end, say=_say)
     print(outcome.summary())
     return 0
+
+
+def _asked(args: argparse.Namespace) -> "tuple[Key, Content | None]":
+    """A key and what to send with it."""
+    from mtm_onboard.protocol import load_key
+
+    return load_key(args.key), None if args.no_message else content(args)
+
+
+def _carried(args: argparse.Namespace) -> "tuple[Key, Content | None]":
+    """The public channel's key, and the disclosed one as its message, once that may be public."""
+    from datetime import UTC, datetime
+
+    from mtm_onboard.model.wall_clock import is_synchronised
+    from mtm_onboard.protocol import MtmError
+    from mtm_onboard.protocol.disclosure import load_anchor, load_disclosed
+    from mtm_onboard.protocol.public_channel import link_to_carry, public_key
+
+    if not args.allow_unsynchronised and is_synchronised() is not True:
+        raise MtmError(
+            "the kernel does not report this computer's clock as synchronised, and a key played too early can be used "
+            "to forge its day; wait for NTP, or give --allow-unsynchronised when you have looked at the clock"
+        )
+    anchor = load_anchor(args.anchor)
+    link = link_to_carry(anchor, load_disclosed(args.disclosed, anchor), datetime.now(UTC))
+    return public_key(anchor), link
 
 
 def _say(sentence: str) -> None:

@@ -71,6 +71,7 @@ def _grant_lines(key: "Key") -> list[str]:
         "robot": f"play {channels}, and make the fleet's tags",
         "auditor": f"read {channels}, and so play them as well",
         "disclosed": f"show anybody what {channels} said",
+        "public": f"read and play the public channel of {channels}",
     }[grant.kind]
     lines = [f"file          {grant.kind}, serial {grant.serial}", f"can do        {can}"]
     days = (grant.last_day - grant.first_day).days + 1

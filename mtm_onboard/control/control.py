@@ -116,6 +116,10 @@ class Control:
             raise MtmError(
                 "the robot was stopped for good and no message would be seen; look at it, and start its run anew"
             )
+        grant = self._session.key.holding.grant
+        if grant is not None and grant.kind == "public":
+            raise MtmError("this run plays a disclosed key on the public channel and nothing else; end it, and run the "
+                           "robot with its key")  # fmt: skip
         with self._one_message_at_a_time:
             # Without a number of its own first, so that content which does not fit takes none.
             message = message_of(content_from_table(content), self._session.key)

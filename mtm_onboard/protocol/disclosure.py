@@ -28,6 +28,8 @@ from mtm_onboard.protocol.schemefile import scheme_text
 MARGIN = timedelta(hours=1)
 """From the end of a day to its disclosure: longer than clocks are apart and than a message that began on the day."""
 
+# How far back a key is looked for that a later day's robots carry.
+_DAYS_BACK = 366
 _FIELDS = {"format", "kind", "id", "first_day", "last_day", "margin_s", "anchor", "scheme"}
 
 
@@ -67,6 +69,13 @@ class Anchor:
         """Whether a link is that of the day: walking down from it reaches the anchor in as many steps as days."""
         first, epoch = (epoch_of_day(each, self.scheme) for each in (self.first_day, day))
         return reaches(tree_of(self.id, self.scheme), link, range(epoch, first - 1, -1), self.value)
+
+    def day_of(self, link: bytes, before: date) -> date | None:
+        """Which of the 366 days before that one has this link; None when none has."""
+        # A step of the chain names its day, so each day has a walk of its own; the latest first, as robots carry it.
+        days = (before - timedelta(number) for number in range(1, _DAYS_BACK + 1))
+        own = (day for day in days if self.first_day <= day <= self.last_day)
+        return next((day for day in own if self.holds(link, day)), None)
 
 
 def reaches(tree: Tree, link: bytes, epochs: range, anchor: bytes) -> bool:

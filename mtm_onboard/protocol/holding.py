@@ -14,7 +14,7 @@ from mtm_onboard.protocol.scheme import Scheme
 from mtm_onboard.protocol.slots import EPOCH_S, last_slot_of_epoch, slot_at
 from mtm_onboard.protocol.tag_key import TagKey
 
-Kind = Literal["master", "robot", "auditor", "disclosed"]
+Kind = Literal["master", "robot", "auditor", "disclosed", "public"]
 _UNIX_DAY = date(1970, 1, 1)
 
 

@@ -3,10 +3,10 @@
 import re
 from collections.abc import Sequence
 from datetime import date, datetime, timedelta
-from typing import Any, get_args
+from typing import Any
 
 from mtm_onboard.protocol.errors import MtmError
-from mtm_onboard.protocol.holding import DayHolding, Grant, Holding, Kind, RobotHolding
+from mtm_onboard.protocol.holding import DayHolding, Grant, Holding, RobotHolding
 from mtm_onboard.protocol.key_tree import Tree, tree_of
 from mtm_onboard.protocol.keystream import SECRET_BYTES
 from mtm_onboard.protocol.master import MasterHolding
@@ -54,7 +54,7 @@ def holding_text(holding: Holding) -> str:
 def holding_from_table(table: dict[str, Any], scheme: Scheme) -> Holding:
     """What a parsed key file of format 2 holds; raises MtmError that says what is wrong, and quotes no secret."""
     kind: Any = table.get("kind")
-    if not isinstance(kind, str) or kind not in get_args(Kind):
+    if not isinstance(kind, str) or kind not in _OWN:
         raise MtmError(f"the kind is {kind!r}; name a file that mtm-onboard keygen or issue wrote")
     unknown = sorted(table.keys() - _COMMON - _OWN[kind] - _OPTIONAL)
     if unknown:

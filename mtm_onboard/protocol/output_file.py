@@ -71,12 +71,23 @@ def output_file(
         yield temporary
 
 
-def _check(path: Path, command: str, force: bool, begins: tuple[bytes, ...]) -> None:
+def check_new_file(path: Path) -> None:
+    """Refuse, before any work, to write a file that exists, or into a folder that does not or cannot be written."""
+    _check_folder(path)
+    if os.path.lexists(path):
+        raise MtmError(f"{path} exists already; choose another name or remove it first")
+
+
+def _check_folder(path: Path) -> None:
     folder = path.parent
     if not folder.is_dir():
         raise MtmError(f"cannot write {path}: there is no folder {folder}; choose a folder that exists")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise MtmError(f"cannot write {path}: the folder {folder} is not yours to write; choose another")
+
+
+def _check(path: Path, command: str, force: bool, begins: tuple[bytes, ...]) -> None:
+    _check_folder(path)
     if not os.path.lexists(path):
         return
     if not path.exists():

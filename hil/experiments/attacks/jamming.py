@@ -12,35 +12,16 @@ import numpy as np
 
 from hil.experiments.attacks.attack import FORETOLD, Attack
 from hil.experiments.attacks.driving import CHANCE_PERCENT, SIGMA_MPS, TRACKER_ERROR_M, overheard, suppressed
-from hil.experiments.attacks.foretelling import fitted, share_foretold
+from hil.experiments.attacks.foretelling import share_foretold
+from hil.experiments.attacks.network import Network
 from hil.experiments.runs.cells import Scalar
 from hil.worlds.discovery import Tamper, Tick
 from mtm_audit.model.track import Floats
 
 EXACT, FILMED = "from exact motion", "from filmed motion"
 _LEVELS = (0.0, 0.5, 1.0, 2.0, 4.0)
-_MEMORY, _UNITS = 20, 200
+_MEMORY = 20
 _TICK_S = 0.1
-
-
-class Network:
-    """`inputs` (m, 2 * memory) to both axes' noise (m, 2), m/s."""
-
-    def __init__(self, inputs: Floats, noise: Floats) -> None:
-        draw = np.random.default_rng(5)
-        self._scale = inputs.std(axis=0) + 1e-9
-        self._hidden = draw.standard_normal((inputs.shape[1], _UNITS)) / np.sqrt(inputs.shape[1])
-        units = self._units(inputs)
-        self._weights = np.stack([fitted(units, noise[:, axis]) for axis in range(2)], axis=1)
-
-    def __call__(self, inputs: Floats) -> Floats:
-        """What it foretells."""
-        return np.asarray(self._units(inputs) @ self._weights)
-
-    def _units(self, inputs: Floats) -> Floats:
-        scaled = inputs / self._scale
-        # The inputs themselves as well, so that it is no worse than a linear predictor.
-        return np.concatenate([np.tanh(scaled @ self._hidden), scaled, np.ones((len(scaled), 1))], axis=1)
 
 
 @lru_cache(maxsize=2)

@@ -5,6 +5,7 @@ from hil.experiments.attacks import (
     band_stop,
     codebook_learning,
     desynchronisation,
+    distillation,
     jamming,
     noise_replacement,
     prediction,
@@ -20,7 +21,7 @@ ATTACKS: dict[str, Attack] = {
     module.ATTACK.name: module.ATTACK
     for module in (
         additive_noise, band_stop, noise_replacement, whitening, prediction, jamming, desynchronisation,
-        codebook_learning, relay, splice, steganalysis,
+        codebook_learning, relay, splice, distillation, steganalysis,
     )
 }  # fmt: skip
 

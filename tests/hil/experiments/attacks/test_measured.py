@@ -65,7 +65,7 @@ def test_a_picture_is_drawn(rows, tmp_path):
 
 def test_all_attacks_have_levels_names_and_a_chance():
     assert {"additive_noise", "band_stop", "noise_replacement", "whitening", "prediction", "jamming", "splice", "relay",
-            "desynchronisation", "codebook_learning", "steganalysis"} == set(ATTACKS)  # fmt: skip
+            "desynchronisation", "codebook_learning", "steganalysis", "distillation"} == set(ATTACKS)  # fmt: skip
     for name, attack in ATTACKS.items():
         assert attack.name == name
         assert all(len(levels) > 1 and list(levels) == sorted(levels) for levels in attack.levels.values())
