@@ -516,6 +516,10 @@ def plan(
         Path | None, typer.Option(metavar="TABLE.csv", help="Compare with accuracies of other recordings.")
     ] = None,
     strategy: Annotated[StrategyName | None, typer.Option(help="Which scheme to write (default: the fastest).")] = None,
+    profile: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.toml", help="A profile of mtm-hil identify: shape the noise for such robots."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE.toml", help="Scheme file for mtm-onboard keygen --scheme.")
     ] = None,
@@ -530,13 +534,15 @@ def plan(
         raise typer.BadParameter("give the control rate, or a key that has it with --like", param_hint="--rate")
     if rate is not None and like is not None:
         raise typer.BadParameter("--like has a rate already; leave out --rate", param_hint="--rate")
+    if profile is not None and like is None:
+        raise typer.BadParameter("the noise to shape is that of a key; give one with --like", param_hint="--profile")
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.plan import PlanOptions, run_plan
         from mtm_audit.planning.plan import Problem
 
         problem = Problem(bits, accuracy, tuple(alphabet) if alphabet else None, measured_only, sure)
         chosen = None if strategy is None else strategy.value
-        code = run_plan(PlanOptions(table, problem, rate, like, chosen, check, plot, out, force))
+        code = run_plan(PlanOptions(table, problem, rate, like, chosen, check, plot, out, force, profile))
     raise typer.Exit(code)
 
 

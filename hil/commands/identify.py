@@ -1,7 +1,7 @@
 """`mtm-hil identify`: a robot's response and interference from what was commanded and how it moved."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ from rich.table import Table
 
 from hil.experiments.identify.fit import fit_interference, fit_response, phase_delay_s
 from hil.experiments.identify.logs import LoggedRun, logged_run, read_commands, read_truth
-from hil.experiments.identify.profile import MOST_MISSED, missed, profile_of
+from hil.experiments.identify.profile import MOST_MISSED, axis_response, missed, profile_of
 from hil.experiments.identify.spectra import RATE_HZ, CrossSpectra, cross_spectra
 from hil.experiments.runs.result_file import provenance, write_result_csv
 from hil.plants.plant_file import IdentifiedAxis, IdentifiedPlant, IdentifiedRobot, save_plant
@@ -69,7 +69,7 @@ def identify(options: IdentifyOptions, console: Console) -> None:
         save_plant(_plant(runs, options), options.plant, [*provenance(command), *_figures(runs)])
         print(f"wrote {options.plant}; use it with mtm-hil bench --plants {options.plant}")
     if options.profile is not None:
-        _write_profile([axis.identified for _, axes in runs for axis in axes], options.profile)
+        _write_profile([axis for _, axes in runs for axis in axes], options.profile)
     if options.out is not None:
         write_result_csv(options.out, command, _COLUMNS, [_row(name, axis) for name, axes in runs for axis in axes])
         print(f"wrote {options.out}")
@@ -108,16 +108,21 @@ def _plant(runs: Sequence[tuple[str, Sequence[MeasuredAxis]]], options: Identify
     return IdentifiedPlant(options.summary, options.source, tuple(robots))
 
 
-def _write_profile(axes: Sequence[IdentifiedAxis], path: Path) -> None:
-    responses = [axis.response for axis in axes]
+def _write_profile(axes: Sequence[MeasuredAxis], path: Path) -> None:
+    responses = [axis.identified.response for axis in axes]
     profile = profile_of(responses)
     if profile is None:
         worst = max(float(missed(response).min()) for response in responses)
         print(f"no profile: the plants that decode knows miss {100 * worst:.0f} % of a response, and at most "
               f"{100 * MOST_MISSED:.0f} % would do")  # fmt: skip
         return
-    save_profile(profile, path, "mtm-hil identify")
-    print(f"wrote {path}; use it with mtm-audit decode --profile {path}")
+    by_name = {name: [axis for axis in axes if axis.name == name] for name in AXES}
+    known = tuple(
+        axis_response(name, [axis.identified.response for axis in own], [axis.spectra for axis in own])
+        for name, own in by_name.items() if own
+    )  # fmt: skip
+    save_profile(replace(profile, axes=known), path, "mtm-hil identify")
+    print(f"wrote {path}; use it with mtm-audit decode --profile {path}, and with mtm-audit plan")
 
 
 def _figures(runs: Sequence[tuple[str, Sequence[MeasuredAxis]]]) -> list[str]:

@@ -4,11 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mtm_audit.commands.console import answer_console
+from mtm_audit.detectors.matched.profile import load_profile
 from mtm_audit.planning.check import check_all
 from mtm_audit.planning.plan import Plan, Problem
 from mtm_audit.planning.provision import scheme_of_plan
 from mtm_audit.planning.report import check_lines, corrections, fastest, headline, remarks, rich_table
 from mtm_audit.planning.search import Found, search
+from mtm_audit.planning.shaping import shaped, shaping_for, shaping_text
 from mtm_audit.planning.table import read_table
 from mtm_audit.reporting.plot import check_plot_path
 from mtm_onboard.protocol.errors import MtmError
@@ -34,6 +36,7 @@ class PlanOptions:
     plot: Path | None
     out: Path | None
     force: bool = False
+    profile: Path | None = None
 
 
 def run_plan(options: PlanOptions) -> int:
@@ -45,10 +48,17 @@ def run_plan(options: PlanOptions) -> int:
     held_out = None if options.check is None else read_table(options.check)
     like = None if options.like is None else load_key(options.like).scheme
     rate_hz = options.rate_hz or (like.rate_hz if like else 0.0)
+    profile = None if options.profile is None else load_profile(options.profile)
     found = search(table, options.problem)
-    scheme = _scheme(options, found, like)
-    checks = [] if held_out is None else check_all([one.plan for one in found if one.plan], held_out)
+    scheme, shaping = _scheme(options, found, like), None
+    if profile is not None and like is not None:
+        shaping = shaping_for(scheme_of_plan(_chosen(options.strategy, found), like), profile)
+        scheme = scheme and shaped(scheme, shaping)
+    plans = [one.plan for one in found if one.plan]
+    checks = [] if held_out is None else check_all(plans, held_out, at_least=shaping is not None)
     lines = [*remarks(table, options.problem, found), *corrections(table, options.problem, found, rate_hz)]
+    if shaping is not None:
+        lines.append(shaping_text(shaping))
     if held_out is not None:
         lines += check_lines(found, checks)
     if options.plot is not None:

@@ -8,6 +8,8 @@ as TOML:
         {delay_s = 0.06, lag_s = 0.1, return_s = inf, weight = 0.93},
         ...
     ]
+
+and, where it was measured, how each axis follows and moves (`axis_response`), for plans.
 """
 
 import math
@@ -17,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from mtm_audit.detectors.matched.axis_response import AxisResponse, axes_from_table, axes_text
 from mtm_audit.detectors.matched.plants import FINE, Plants
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.atomicfile import replacing
@@ -31,9 +34,10 @@ _TRUST = 0.9
 
 @dataclass(frozen=True)
 class PlantProfile:
-    """Probabilities of the plants of the family `FINE`: `weights` (plants,), of sum 1."""
+    """Probabilities of the plants of the family `FINE`: `weights` (plants,), of sum 1; `axes` that were measured."""
 
     weights: Floats
+    axes: tuple[AxisResponse, ...] = ()
 
 
 def log_prior(profile: PlantProfile | None, plants: Plants) -> Floats:
@@ -59,7 +63,7 @@ def profile_text(profile: PlantProfile) -> str:
             FINE.delays_s, FINE.lags_s, FINE.returns_s, profile.weights, strict=True
         )
     ]
-    return "\n".join([f"format = {PROFILE_FORMAT}", "plants = [", *rows, "]"]) + "\n"
+    return "\n".join([f"format = {PROFILE_FORMAT}", "plants = [", *rows, "]"]) + "\n" + axes_text(profile.axes)
 
 
 def save_profile(profile: PlantProfile, path: Path, command: str = "mtm-audit profile") -> None:
@@ -76,7 +80,7 @@ def load_profile(path: Path) -> PlantProfile:
             f"{path} is of profile format {table.get('format')!r}, this program reads {PROFILE_FORMAT}; make it anew "
             "with mtm-audit profile"
         )
-    unknown = sorted(table.keys() - {"format", "plants"})
+    unknown = sorted(table.keys() - {"format", "plants", "axes"})
     if unknown:
         raise MtmError(f"{path} has an unknown field {unknown[0]!r}; remove it or correct its spelling")
     rows = table.get("plants")
@@ -87,7 +91,8 @@ def load_profile(path: Path) -> PlantProfile:
     if abs(weights.sum() - 1.0) > 0.01:
         raise MtmError(f"{path}: the weights add up to {weights.sum():.3g} and not to 1; make it anew with "
                        "mtm-audit profile")  # fmt: skip
-    return PlantProfile(weights / weights.sum())
+    axes = axes_from_table(table["axes"], str(path)) if "axes" in table else ()
+    return PlantProfile(weights / weights.sum(), axes)
 
 
 def _weight(path: Path, row: Any, number: int) -> float:

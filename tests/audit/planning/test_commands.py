@@ -3,11 +3,16 @@ import re
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mtm_audit.cli import main
+from mtm_audit.detectors.matched.axis_response import AxisResponse
+from mtm_audit.detectors.matched.plants import FINE
+from mtm_audit.detectors.matched.profile import PlantProfile, save_profile
 from mtm_audit.planning.table import AccuracyPoint, AccuracyTable, read_table, write_table
 from mtm_onboard.cli import main as onboard
 from mtm_onboard.protocol import Channel, Key, Scheme, load_key, save_key
@@ -295,3 +300,49 @@ def test_the_table_that_the_project_measured_can_be_planned_with(audit):
     path = Path(__file__).parents[3] / "results/accuracy_table.csv"
     assert len(read_table(path).channels) == 15
     assert audit("plan", path, "--bits", "8", "--rate", "50")[0] == 0
+
+
+@pytest.fixture
+def profile(folder):
+    """A profile of robots that follow up to 1 Hz, on both axes of the key."""
+    rows = tuple((hz, 1.0 / (1.0 + hz), 0.01) for hz in (0.3, 0.6, 1.2, 2.4, 4.8, 9.6))
+    axes = tuple(AxisResponse(name, rows) for name in ("x", "y"))
+    weights = np.full(len(FINE.taps), 1.0 / len(FINE.taps))
+    save_profile(PlantProfile(weights, axes), folder / "rover.toml", "mtm-hil identify")
+    return "rover.toml"
+
+
+def test_a_profile_shapes_the_scheme(audit, profile):
+    job = ("--bits", "10", "--alphabet", "4", "--measured-only", "--like", "lander.key")
+    code, out, err = audit("plan", "lander.csv", *job, "--profile", profile, "--out", "plan.toml")
+    assert (code, err) == (0, "")
+    scheme = load_scheme(Path("plan.toml"))
+    assert scheme.name == "lander-split-M4-T576-filled"
+    points = ",".join(f"{hz:g}:{level_db:g}" for hz, level_db in scheme.spectrum)
+    assert f"spectrum {points}: by capacity " in out
+    assert onboard(["keygen", "--id", "fake", "--scheme", "plan.toml", "--out", "shaped.key"]) == 0
+    assert load_key(Path("shaped.key")).scheme == scheme
+
+
+def test_a_profile_needs_a_key_and_its_axes(audit, folder, profile):
+    code, _, err = audit("plan", "lander.csv", *JOB, "--profile", profile)
+    assert code == 2
+    assert "give one with --like" in err
+    weights = np.full(len(FINE.taps), 1.0 / len(FINE.taps))
+    save_profile(PlantProfile(weights), folder / "bare.toml", "mtm-hil identify")
+    job = ("--bits", "10", "--alphabet", "4", "--like", "lander.key")
+    code, _, err = audit("plan", "lander.csv", *job, "--profile", "bare.toml", "--out", "plan.toml")
+    assert code == 1
+    assert "does not say how the axis x follows" in err
+    assert not Path("plan.toml").exists()
+
+
+def test_shaped_noise_may_be_better_than_predicted(audit, folder, profile):
+    """A table of flat noise predicts the least that shaped noise reaches."""
+    better = [replace(point, successes=point.trials) for point in LANDER.points]
+    write_table(folder / "better.csv", AccuracyTable(tuple(better)))
+    job = ("--bits", "10", "--alphabet", "4", "--measured-only", "--like", "lander.key", "--check", "better.csv")
+    assert audit("plan", "lander.csv", *job)[0] == 4
+    code, out, _ = audit("plan", "lander.csv", *job, "--profile", profile)
+    assert code == 0
+    assert "more than predicted, as noise that is shaped for these robots may be" in out

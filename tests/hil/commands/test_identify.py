@@ -35,7 +35,9 @@ def test_two_robots_become_a_plant_a_profile_and_a_table(tmp_path, logs, capsys)
     rows = [line.split(",") for line in out.read_text().splitlines() if not line.startswith("#")]
     assert [row[:2] for row in rows[1:]] == [["Robot1_Odometry", "vx"], ["Robot1_Odometry", "wz"],
                                              ["Robot2_Odometry", "vx"], ["Robot2_Odometry", "wz"]]  # fmt: skip
-    assert load_profile(profile).weights.sum() == pytest.approx(1.0)
+    learnt = load_profile(profile)
+    assert learnt.weights.sum() == pytest.approx(1.0)
+    assert [axis.name for axis in learnt.axes] == ["vx", "wz"]
     assert f"use it with mtm-hil bench --plants {plant}" in capsys.readouterr().out
 
 
