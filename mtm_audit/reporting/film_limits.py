@@ -42,4 +42,4 @@ def displacement_m(channel: Channel, scheme: Scheme) -> float:
     Its tones have equal mean power, so the mean square is sigma^2 times the mean of 1 / (2 pi f)^2 over the band.
     """
     low_hz, high_hz = scheme.band_hz
-    return float(channel.sigma / (2.0 * np.pi * np.sqrt(low_hz * high_hz)))
+    return float(min(channel.sigmas) / (2.0 * np.pi * np.sqrt(low_hz * high_hz)))
