@@ -29,7 +29,7 @@ def three_axes(tmp_path):
 @pytest.mark.parametrize("wire", ["direct", "can"])
 def test_a_message_on_three_axes_is_decoded(three_axes, wire):
     symbols = (9, 60, 33, 2, 47, 18)
-    settings = RunSettings(key=three_axes, symbols=symbols, seconds=9.0, seed=4, wire=wire, start_s=START_S)
+    settings = RunSettings(key=three_axes, symbols=symbols, seconds=20.0, seed=4, wire=wire, start_s=START_S)
     tracks = motion_capture_tracks(run_lockstep(settings), settings.seed, MotionCapture())
     found = decode_tracks(tracks, three_axes, DecodeSettings(onset_s=START_S))
     assert found.symbols == symbols
