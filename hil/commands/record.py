@@ -134,7 +134,7 @@ def _scheme(options: RecordOptions) -> Scheme:
     if isinstance(content, str | bytes):
         size = len(content.encode() if isinstance(content, str) else content)
         usual = tagged_scheme(robots, "text" if isinstance(content, str) else "bytes", 8 * max(_USUAL_BYTES, size))
-    axes = vehicle(options.plant).kind.axes
+    axes = vehicle(options.plant).kind.follows
     return replace(usual, channels=tuple(replace(channel, axes=axes) for channel in usual.channels))
 
 
@@ -173,7 +173,7 @@ def _print_summary(options: RecordOptions, settings: RunSettings) -> None:
     robots = f"{count} robot" if count == 1 else f"{count} robots"
     print(f"{options.out}: {robots}, {settings.seconds:g} s of motion, {sent}")
     scheme = settings.key.scheme
-    axes = vehicle(options.plant).kind.axes
+    axes = vehicle(options.plant).kind.follows
     played = dict.fromkeys(axis for channel in scheme.channels for axis in channel.axes)
     if message is not None and not played.keys() <= set(axes):
         print(f"the key's noise is on {', '.join(played)}; {options.plant} carries it on {', '.join(axes)}")

@@ -26,7 +26,7 @@ from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Channel
 from mtm_onboard.protocol.framing import channel_symbols
-from mtm_onboard.runtime.guard import Guard, Staleness
+from mtm_onboard.runtime.guard import Guard, Staleness, body_sigmas
 from mtm_onboard.runtime.loop import LoopStats, run_loop
 from mtm_onboard.runtime.message import Message
 from mtm_onboard.runtime.source import HeldSource
@@ -181,8 +181,7 @@ def _robot(
     source = HeldSource()
     period_s = 1.0 / settings.key.scheme.rate_hz
     channels = settings.channels(name)
-    sigma = max((channel.sigma for channel in channels), default=0.0)
-    guard = Guard(LIMITS, Staleness(), noise_sigma=sigma, period_s=period_s)
+    guard = Guard(LIMITS, Staleness(), noise_sigma=body_sigmas(channels), period_s=period_s)
     adders = [] if message is None else [_modulator(settings, channel, message) for channel in channels]
     modulator = adders[0] if len(adders) == 1 else _Adders(adders) if adders else None
     runtime = Runtime(modulator, guard, source, link.transport)

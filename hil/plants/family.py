@@ -35,13 +35,20 @@ Draw = np.random.Generator
 class PlantKind:
     """`summary` in a line, `axes` that carry a message's noise, and how a robot of the kind is drawn.
 
-    An arm's tool has no heading; everything else does.
+    An arm's tool has no heading; everything else does. `turns` where a demand of yaw rate is followed by itself as
+    well, which is a third axis for a message though robots of the kind are measured without it.
     """
 
     summary: str
     axes: tuple[str, ...]
     draw: Callable[[Draw], Robot]
     has_heading: bool = True
+    turns: bool = False
+
+    @property
+    def follows(self) -> tuple[str, ...]:
+        """The axes on which noise moves such a robot: its own, and the yaw rate of one that turns by itself."""
+        return tuple(dict.fromkeys([*self.axes, *(("wz",) if self.turns else ())]))
 
 
 def _robomaster(_draw: Draw) -> Robot:
@@ -164,7 +171,7 @@ ROBOMASTER = "robomaster"
 CREATE_FILE = Path(__file__).with_name("create_plant.toml")
 
 PLANTS: dict[str, PlantKind] = {
-    ROBOMASTER: PlantKind("mecanum wheels, calibrated to the paper's hardware", _WORLD, _robomaster),
+    ROBOMASTER: PlantKind("mecanum wheels, calibrated to the paper's hardware", _WORLD, _robomaster, turns=True),
     "diff-drive": PlantKind("two driven wheels; ahead and turn rate carry the noise", ("vx", "wz"), _differential),
     "spinning": PlantKind("omnidirectional wheels, turning at 1 rad/s all the time", _WORLD, _holonomic),
     "heavy": PlantKind("lag of 0.8 s and a slew limit", _WORLD, _heavy),

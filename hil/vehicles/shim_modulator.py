@@ -53,7 +53,8 @@ class ShimModulator:
 
     def perturbation(self, tick: int) -> Floats:
         """Noise of this tick in multiples of sigma, shape (axes,); zeros outside the message."""
-        return np.array(self.add(tick, STOP))[self._axes] / self.channel.sigma
+        noise: Floats = np.array(self.add(tick, STOP))[self._axes] / np.array(self.channel.sigmas)
+        return noise
 
     def substitute(self, tick: int, mean: Floats, sigma: Floats | float) -> Floats:
         """The action mean + sigma * eps of a Gaussian policy, with the keyed noise as its eps; shape (axes,)."""

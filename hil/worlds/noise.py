@@ -33,7 +33,7 @@ def keyed_noise(codebook: Codebook, messages: Sequence[Sequence[int]], axes: Seq
     for number, symbols in enumerate(messages):
         for name, own in channel_symbols(symbols, scheme).items():
             modulator = Modulator(codebook, name, own, repeat=False)
-            sigma = modulator.channel.sigma
+            sigma = np.array(modulator.channel.sigmas)
             noise[number][:, columns[name]] = [
                 sigma * modulator.perturbation(tick) for tick in range(scheme.message_ticks)
             ]
@@ -46,5 +46,5 @@ def white_noise(scheme: Scheme, ticks: int, axes: Sequence[str], generator: np.r
     noise = np.zeros((ticks, len(axes)))
     for channel in scheme.channels:
         own = columns[channel.name]
-        noise[:, own] = channel.sigma * generator.standard_normal((ticks, len(own)))
+        noise[:, own] = np.array(channel.sigmas) * generator.standard_normal((ticks, len(own)))
     return noise

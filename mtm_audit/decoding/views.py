@@ -57,8 +57,8 @@ def parts_of(channel: Channel, glimpse: Glimpse, frame: ReferenceFrame) -> list[
     own = along_own_axes(glimpse, frame)
     if yaw is None:
         return [Observation(channel, own)]
-    parts = [Observation(replace(channel, axes=planar), own)] if planar else []
-    return [*parts, Observation(replace(channel, axes=turned), yaw)]
+    parts = [Observation(channel.on(planar), own)] if planar else []
+    return [*parts, Observation(channel.on(turned), yaw)]
 
 
 def _turning(channel: Channel) -> tuple[str, ...]:
@@ -165,4 +165,4 @@ def _pairs_of_kind(
     rows = [row for row, axes in own.items() if axes]
     if not rows or not seen:
         return None
-    return rows, [replace(channels[row], axes=own[row]) for row in rows], list(seen), list(seen.values())
+    return rows, [channels[row].on(own[row]) for row in rows], list(seen), list(seen.values())

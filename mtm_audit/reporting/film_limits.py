@@ -46,4 +46,4 @@ def displacement_m(channel: Channel, scheme: Scheme) -> float:
         tones_hz, powers = channel_tones(scheme, channel)
         return float(channel.sigma * np.sqrt(np.mean(powers / (2.0 * np.pi * tones_hz) ** 2)))
     low_hz, high_hz = scheme.band_hz
-    return float(channel.sigma / (2.0 * np.pi * np.sqrt(low_hz * high_hz)))
+    return float(min(channel.sigmas) / (2.0 * np.pi * np.sqrt(low_hz * high_hz)))

@@ -118,8 +118,9 @@ def _sealed(args: argparse.Namespace, scheme: "Scheme", channel: "Channel", imag
 
     number = scheme.channels.index(channel) if args.device_channel is None else args.device_channel
     counter = int(time.time()) if args.counter is None else args.counter
-    most = channel.sigma * (_NOISE_SIGMAS if args.noise_limit is None else args.noise_limit)
-    limits = [most if axis in channel.axes else 0.0 for axis in AXES]
+    most = _NOISE_SIGMAS if args.noise_limit is None else args.noise_limit
+    sigmas = dict(zip(channel.axes, channel.sigmas, strict=True))
+    limits = [most * sigmas.get(axis, 0.0) for axis in AXES]
     return sealed(image, seal_of(number, counter, limits), load_device_key(args.device_key))
 
 

@@ -64,7 +64,8 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--message-ticks", type=int, metavar="T", help="length of a message in control periods")
     parser.add_argument(
         "--channel", action="append", metavar="NAME:AXES:SYMBOLS:SIGMA[:BODY]",
-        help="a channel, such as robot0:vx,vy:1:0.1, once for each; the body is named like the channel unless given",
+        help="a channel, such as robot0:vx,vy:1:0.1, once for each; SIGMA may be one for each axis, as 0.1,0.1,0.2; "
+        "the body is named like the channel unless given",
     )  # fmt: skip
     parser.add_argument(
         "--combine", metavar="split|same", help="split (default): each channel carries its part; same: all carry all"
@@ -220,6 +221,11 @@ def _points(text: str) -> tuple[tuple[float, float], ...]:
     return tuple((float(frequency), float(level)) for frequency, level in pairs)
 
 
+def _sigma(text: str) -> float | tuple[float, ...]:
+    values = tuple(float(value) for value in text.split(","))
+    return values[0] if len(values) == 1 else values
+
+
 def _channel(text: str) -> "Channel":
     from mtm_onboard.protocol import Channel, MtmError
 
@@ -227,6 +233,6 @@ def _channel(text: str) -> "Channel":
     try:
         name, axes, symbols, sigma, *body = parts
         (body_name,) = body or [name]
-        return Channel(name, body_name, tuple(axes.split(",")), int(symbols), float(sigma))
+        return Channel(name, body_name, tuple(axes.split(",")), int(symbols), _sigma(sigma))
     except ValueError as error:
         raise MtmError(f"the channel {text!r} is not NAME:AXES:SYMBOLS:SIGMA[:BODY]; see keygen --help") from error

@@ -47,7 +47,7 @@ def _lines(key: "Key") -> list[str]:
         lines.append(
             f"channel       {channel.name}: body {channel.body}, axes {','.join(channel.axes)}, "
             f"{channel.symbols} symbols of {ticks} ticks ({count_bins(ticks, scheme.rate_hz, scheme.band_hz)} tones), "
-            f"sigma {channel.sigma:g}"
+            f"sigma {channel.sigma_text}"
         )
     return lines
 

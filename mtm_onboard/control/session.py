@@ -25,7 +25,7 @@ from mtm_onboard.protocol import Key, MtmError, Scheme
 from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.runtime.config import RobotConfig, SourceSettings
 from mtm_onboard.runtime.datagram_source import UdpSource, UnixSource
-from mtm_onboard.runtime.guard import Guard
+from mtm_onboard.runtime.guard import Guard, body_sigmas
 from mtm_onboard.runtime.loop import LoopStats, run_loop
 from mtm_onboard.runtime.message import SILENCE, Content, Played, Silence, message_of
 from mtm_onboard.runtime.modulator import Modulator
@@ -128,7 +128,7 @@ def run_session(
     _check_start(plan, wall.unix_s(), rolling=rolling)
     if grant is not None:
         grant.check_unexpired(wall.unix_s())
-    guard = Guard(config.limits, config.staleness, noise_sigma=channel.sigma, period_s=1 / rate_hz)
+    guard = Guard(config.limits, config.staleness, noise_sigma=body_sigmas([channel]), period_s=1 / rate_hz)
     transport = _link(config, clock) if ends is None else ends.transport
     # The stack closes in reverse: the robot is told to stop before a socket or a slow disk is waited for.
     with ExitStack() as stack:

@@ -41,25 +41,27 @@ def _check_limits(config: RobotConfig, scheme: Scheme, channel: Channel) -> Find
     if part <= _WARN_SHARE:
         return Finding(
             "fit", "pass",
-            f"channel {channel.name} on {', '.join(channel.axes)}, sigma {channel.sigma:g}: at a standstill the limits "
-            "leave the noise whole", figures,
+            f"channel {channel.name} on {', '.join(channel.axes)}, sigma {channel.sigma_text}: at a standstill the "
+            "limits leave the noise whole", figures,
         )  # fmt: skip
     return Finding(
         "fit", "fail" if part > _FAIL_SHARE else "warn",
         f"even at a standstill {limit} cuts the noise of channel {channel.name} in {100 * part:.0f}% of the ticks; "
-        f"raise it, or make a key with a sigma below {channel.sigma:g}", figures,
+        f"raise it, or make a key with a sigma below {channel.sigma_text}", figures,
     )  # fmt: skip
 
 
 def _parts_cut(config: RobotConfig, scheme: Scheme, channel: Channel) -> dict[str, float]:
     """Part of the ticks that each limit cuts, by its name, for Gaussian noise around a standstill."""
-    limits, sigma = config.limits, channel.sigma
+    limits, sigmas = config.limits, dict(zip(channel.axes, channel.sigmas, strict=True))
     straight = len({"vx", "vy"} & set(channel.axes))
+    # Of two that differ the larger is taken for both.
+    sigma = max((sigmas[axis] for axis in ("vx", "vy") if axis in sigmas), default=1.0)
     inside = math.erf(limits.noise_sigmas / math.sqrt(2.0))
     parts = {
         "noise_sigmas": 1.0 - inside ** len(channel.axes),
         "speed_mps": _beyond(limits.speed_mps / sigma, straight),
-        "turn_rate_radps": _beyond(limits.turn_rate_radps / sigma, int("wz" in channel.axes)),
+        "turn_rate_radps": _beyond(limits.turn_rate_radps / sigmas.get("wz", 1.0), int("wz" in channel.axes)),
     }
     if limits.acceleration_mps2 is not None:
         step = limits.acceleration_mps2 / scheme.rate_hz

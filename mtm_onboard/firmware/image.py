@@ -85,7 +85,7 @@ def channel_image(
     parts = [
         codebook.samples(channel, window, [symbols[place % len(symbols)]])[0] for place, window in enumerate(windows)
     ]
-    noise = channel.sigma * np.concatenate(parts, axis=1)
+    noise = np.array(channel.sigmas)[:, None] * np.concatenate(parts, axis=1)
     # The format has the axes in the order vx, vy, wz, a channel in any.
     order = sorted(range(len(channel.axes)), key=lambda row: AXES.index(channel.axes[row]))
     samples = np.empty(noise.shape, np.int16)

@@ -42,7 +42,7 @@ class KeyedNoise:
         self.random = random
         self.sigma = np.zeros(len(self.axes))
         for modulator, own in zip(modulators, places, strict=True):
-            self.sigma[own] = modulator.channel.sigma
+            self.sigma[own] = modulator.channel.sigmas
         self._places = places
         self._tick = count().__next__ if tick is None else tick
 

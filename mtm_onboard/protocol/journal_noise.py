@@ -39,7 +39,7 @@ def with_noise(record: JournalRecord, key: Key) -> JournalRecord:
         if len(slot.symbols) != channel.symbols:
             raise MtmError("the journal's symbols are not those of its channel; name the key that the run had")
         samples = [codebook.samples(channel, window, [slot.symbols[window]])[0] for window in windows]
-        noise = channel.sigma * np.concatenate(samples, axis=1)
+        noise = np.array(channel.sigmas)[:, None] * np.concatenate(samples, axis=1)
         sent[rows] = record.base[rows]
         for column, axis in zip(columns, noise, strict=True):
             sent[rows, column] += axis[ticks[rows]]

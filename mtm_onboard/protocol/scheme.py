@@ -3,7 +3,7 @@
 import hashlib
 import json
 import math
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal, get_args
 
 from mtm_onboard.protocol.errors import MtmError
@@ -29,14 +29,29 @@ class Channel:
 
     `axes` name commanded degrees of freedom ("vx", "vy", a joint); `symbols` is the paper's l_c, the number of
     symbols this channel sends in one message; `sigma` is the standard deviation of the noise in the unit of the
-    command (m/s, rad/s, N m). `body` names the thing that a tracker follows.
+    command (m/s, rad/s, N m), one for all axes or one for each. `body` names the thing that a tracker follows.
     """
 
     name: str
     body: str
     axes: tuple[str, ...]
     symbols: int
-    sigma: float
+    sigma: float | tuple[float, ...]
+
+    @property
+    def sigmas(self) -> tuple[float, ...]:
+        """The standard deviation of the noise on each axis, (axes,)."""
+        return self.sigma if isinstance(self.sigma, tuple) else (self.sigma,) * len(self.axes)
+
+    @property
+    def sigma_text(self) -> str:
+        """The sigma for people: one number, or one for each axis."""
+        return ", ".join(f"{sigma:g}" for sigma in (self.sigmas if isinstance(self.sigma, tuple) else [self.sigma]))
+
+    def on(self, axes: tuple[str, ...]) -> "Channel":
+        """The channel with some of its axes only."""
+        each = tuple(sigma for axis, sigma in zip(self.axes, self.sigmas, strict=True) if axis in axes)
+        return replace(self, axes=axes, sigma=each if isinstance(self.sigma, tuple) else self.sigma)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,7 +201,8 @@ def _channel_from_table(table: dict[str, Any]) -> Channel:
     axes = table["axes"]
     if not isinstance(axes, list):
         raise MtmError("a channel's axes must be a list of names")
-    return Channel(table["name"], table["body"], tuple(axes), table["symbols"], table["sigma"])
+    sigma = tuple(table["sigma"]) if isinstance(table["sigma"], list) else table["sigma"]
+    return Channel(table["name"], table["body"], tuple(axes), table["symbols"], sigma)
 
 
 def _refuse_unknown(table: dict[str, Any], known: set[str], where: str) -> None:
@@ -223,7 +239,10 @@ def _check_types(scheme: Scheme) -> None:
         if getattr(scheme, label) not in get_args(values):
             raise MtmError(f"{label} is {getattr(scheme, label)!r}; choose one of: {', '.join(get_args(values))}")
     numbers = {"rate_hz": scheme.rate_hz, "band_hz low": scheme.band_hz[0], "band_hz high": scheme.band_hz[1]}
-    numbers |= {f"sigma of channel {channel.name!r}": channel.sigma for channel in scheme.channels}
+    for channel in scheme.channels:
+        each = dict(enumerate(channel.sigma)) if isinstance(channel.sigma, tuple) else {None: channel.sigma}
+        of = {place: "" if place is None else f" of axis {place + 1}" for place in each}
+        numbers |= {f"sigma{of[place]} of channel {channel.name!r}": sigma for place, sigma in each.items()}
     for label, value in numbers.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value <= 0:
             raise MtmError(f"{label} is {value!r}; give a number above zero")
@@ -255,6 +274,11 @@ def _check_band(scheme: Scheme) -> None:
 def _check_channel(scheme: Scheme, channel: Channel) -> None:
     if not channel.axes or len(set(channel.axes)) != len(channel.axes):
         raise MtmError(f"channel {channel.name!r} needs one or more axes, each named once")
+    if len(channel.sigmas) != len(channel.axes):
+        raise MtmError(
+            f"channel {channel.name!r} has {len(channel.axes)} axes and {len(channel.sigmas)} sigmas; give one sigma "
+            "for all axes, or one for each"
+        )
     if channel.symbols < 1:
         raise MtmError(f"channel {channel.name!r} sends {channel.symbols} symbols; give it at least 1 or remove it")
     if scheme.message_ticks < 1 or scheme.message_ticks % channel.symbols:

@@ -10,11 +10,13 @@ bounded; and its stop can be released.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
-from mtm_onboard.model.velocity import STOP, BodyVelocity
+from mtm_onboard.model.velocity import AXES, STOP, BodyVelocity
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.journal_file import CLAMPED, HELD, NOISE, REFUSED, STALE, STOPPED, UNSENT
+from mtm_onboard.protocol.scheme import Channel
 
 # Instants are sums of decimal fractions, so an age that is within this of a bound has reached it.
 _HAIR_S = 1e-9
@@ -55,20 +57,32 @@ class Staleness:
             )
 
 
+def body_sigmas(channels: Sequence[Channel]) -> tuple[float, float, float]:
+    """The sigma of the noise that channels of one body put on vx, vy and wz; 0 where they put none."""
+    vx, vy, wz = (
+        max((dict(zip(each.axes, each.sigmas, strict=True)).get(axis, 0.0) for each in channels), default=0.0)
+        for axis in AXES
+    )
+    return vx, vy, wz
+
+
 class Guard:
     """Holds the limits and the newest good base command; one `admit` and one `limit` a tick.
 
-    `noise_sigma` is the channel's sigma and `period_s` the control period. Counters: `clamped`, `stale`, `refused`,
-    `held` and `unsent` ticks. `flags` tells what happened in the tick at hand, in the bits of
-    `mtm_onboard.protocol.journal_file`.
+    `noise_sigma` is the sigma of the noise, one for all axes or one for each of vx, vy and wz (see `body_sigmas`), and
+    `period_s` the control period. Counters: `clamped`, `stale`, `refused`, `held` and `unsent` ticks. `flags` tells
+    what happened in the tick at hand, in the bits of `mtm_onboard.protocol.journal_file`.
     """
 
-    def __init__(self, limits: Limits, staleness: Staleness, *, noise_sigma: float, period_s: float) -> None:
+    def __init__(
+        self, limits: Limits, staleness: Staleness, *, noise_sigma: float | tuple[float, float, float], period_s: float
+    ) -> None:
         self.flags = 0
         self.clamped = self.stale = self.refused = self.held = self.unsent = 0
         self._speed = limits.speed_mps
         self._turn = limits.turn_rate_radps
-        self._noise = limits.noise_sigmas * noise_sigma
+        each = noise_sigma if isinstance(noise_sigma, tuple) else (noise_sigma,) * len(AXES)
+        self._noise = tuple(limits.noise_sigmas * sigma for sigma in each)
         self._step = math.inf if limits.acceleration_mps2 is None else limits.acceleration_mps2 * period_s
         self._noise_off_s = staleness.noise_off_s
         self._stopped_s = staleness.stopped_s
@@ -158,13 +172,13 @@ class Guard:
             self.flags |= REFUSED
             return base
         self.flags |= NOISE
-        bound = self._noise
-        calm = -bound <= x <= bound and -bound <= y <= bound and -bound <= z <= bound
+        most_x, most_y, most_z = self._noise
+        calm = -most_x <= x <= most_x and -most_y <= y <= most_y and -most_z <= z <= most_z
         slow = want_x * want_x + want_y * want_y <= self._speed * self._speed
         if calm and slow and -self._turn <= want_z <= self._turn:
             return wanted
         self._count_clamp()
-        x, y, z = (max(-bound, min(bound, value)) for value in (x, y, z))
+        x, y, z = (max(-most, min(most, value)) for most, value in zip(self._noise, (x, y, z), strict=True))
         part = _part_within(base_x, base_y, x, y, self._speed)
         turn_radps = max(-self._turn, min(self._turn, base_z + z))
         return BodyVelocity(base_x + part * x, base_y + part * y, turn_radps)

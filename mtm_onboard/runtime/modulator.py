@@ -258,7 +258,7 @@ class Modulator:
         noise[rows] = samples
         noise.flags.writeable = False
         if self._body_axes is not None:
-            offsets[rows, self._body_axes] = self.channel.sigma * samples
+            offsets[rows, self._body_axes] = np.array(self.channel.sigmas) * samples
 
     def _rows(self, windows: int) -> tuple[Floats, Floats]:
         noise = np.zeros((windows * self._window_ticks, len(self.channel.axes)))

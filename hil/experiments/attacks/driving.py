@@ -24,7 +24,7 @@ from mtm_onboard.protocol import Codebook, Scheme
 READERS = (COHERENCY, MATCHED)
 POINT = headline_point("discovery", 120)
 SCHEME = POINT.scheme
-SIGMA_MPS = SCHEME.channels[0].sigma
+SIGMA_MPS = SCHEME.channels[0].sigmas[0]
 TICKS = POINT.goals * POINT.goal_ticks
 CHANCE_PERCENT = 100.0 / POINT.alphabet_size
 # What the tracker of the paper's pictures of 704 pixels is off by, measured on a rollout: 0.23 pixels of 1/352 m.

@@ -34,7 +34,7 @@ from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.protocol import Channel, Key, MtmError, Scheme
 from mtm_onboard.protocol.journal_file import segments
 from mtm_onboard.protocol.slots import EPOCH_S, next_slot, slot_at, slot_start_unix_s
-from mtm_onboard.runtime.guard import Guard, Staleness
+from mtm_onboard.runtime.guard import Guard, Staleness, body_sigmas
 from mtm_onboard.runtime.loop import LoopStats, run_loop
 from mtm_onboard.runtime.message import PlainMessage
 from mtm_onboard.runtime.modulator import Modulator
@@ -143,7 +143,7 @@ class _Robot:
             start_unix_s=begin_unix_s,
         )
         self._journal = Journal(folder / "robot0.csv", header, threaded=False, max_bytes=journal_bytes)
-        self._guard = Guard(LIMITS, Staleness(), noise_sigma=_SCHEME.channels[0].sigma, period_s=1.0 / rate_hz)
+        self._guard = Guard(LIMITS, Staleness(), noise_sigma=body_sigmas(_SCHEME.channels[:1]), period_s=1.0 / rate_hz)
         modulator = Modulator(_KEY.codebook(next_slot(begin_unix_s, _SCHEME)), "robot0", PlainMessage(SYMBOLS))
         self._source, self._stats = HeldSource(), LoopStats()
         self._runtime = Runtime(modulator, self._guard, self._source, self._link, self._journal)

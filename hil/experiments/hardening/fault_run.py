@@ -32,7 +32,7 @@ from mtm_onboard.links.robomaster_can import RoboMasterCan
 from mtm_onboard.model.velocity import BodyVelocity
 from mtm_onboard.protocol import Key, MtmError
 from mtm_onboard.protocol.journal_file import JournalRecord, read_journal
-from mtm_onboard.runtime.guard import Guard, Staleness
+from mtm_onboard.runtime.guard import Guard, Staleness, body_sigmas
 from mtm_onboard.runtime.modulator import Modulator
 from mtm_onboard.runtime.source import HeldSource
 from mtm_onboard.runtime.tick import Runtime
@@ -140,7 +140,7 @@ class _Ticks:
     ) -> None:
         channel, rate_hz = key.scheme.channels[0], key.scheme.rate_hz
         self._source = HeldSource()
-        guard = Guard(LIMITS, Staleness(), noise_sigma=channel.sigma, period_s=1.0 / rate_hz)
+        guard = Guard(LIMITS, Staleness(), noise_sigma=body_sigmas([channel]), period_s=1.0 / rate_hz)
         modulator = Modulator(key.codebook(), channel.name, symbols)
         self._runtime = Runtime(modulator, guard, self._source, link, journal)
         self._task = TASKS["orbit"](Route((0.0, 0.0), ()), seed)

@@ -109,7 +109,7 @@ def played(book: Codebook, symbols: dict[str, tuple[int, ...]]) -> tuple[Floats,
 def waveform(book: Codebook, channel: Channel, symbols: Sequence[int]) -> Floats:
     """The noise of a whole slot in m/s, (ticks, axes)."""
     parts = [book.samples(channel, window, [symbol])[0] for window, symbol in enumerate(symbols)]
-    noise: Floats = channel.sigma * np.concatenate(parts, axis=1).T
+    noise: Floats = np.array(channel.sigmas) * np.concatenate(parts, axis=1).T
     return noise
 
 
@@ -164,7 +164,7 @@ def _learnt(fleet: Fleet) -> Film:
         chosen = fleet.draw.choice(known, channel.symbols)
         parts = [np.mean(sums[number, int(symbol)], axis=0) for symbol in chosen]
         # As loud as the robots are.
-        robots.append(np.concatenate([part * (channel.sigma / np.sqrt(np.mean(part**2))) for part in parts]))
+        robots.append(np.concatenate([part * (np.array(channel.sigmas) / np.sqrt(np.mean(part**2))) for part in parts]))
     return _now(fleet, tuple(robots))
 
 

@@ -92,7 +92,7 @@ def genie_scores(
     observed, injected, memory = model.taps.shape
     flat = model.taps.reshape(observed, injected * memory)
     ticks = codebook.scheme.window_ticks(channel)
-    candidates = channel.sigma * codebook.samples(channel, 0).transpose(0, 2, 1)
+    candidates = np.array(channel.sigmas) * codebook.samples(channel, 0).transpose(0, 2, 1)
     scores = []
     for known, shot in zip(own, seen, strict=True):
         length = len(shot.ticks)
@@ -114,7 +114,7 @@ def genie_scores(
 
 def _played(codebook: Codebook, channel: Channel, symbols: Sequence[int]) -> list[Floats]:
     waveforms = codebook.samples(channel, 0)
-    return [channel.sigma * waveforms[symbol].T for symbol in symbols]
+    return [np.array(channel.sigmas) * waveforms[symbol].T for symbol in symbols]
 
 
 def _bin_ticks(known: KnownShot) -> int:

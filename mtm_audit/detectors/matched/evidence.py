@@ -16,7 +16,8 @@ def half_log_evidence(precision: Floats, information: Floats) -> Floats:
     axes = information.shape[-1]
     rows: list[list[Floats]] = []
     solved: list[Floats] = []
-    total = np.zeros(np.broadcast_shapes(precision.shape[:-2], information.shape[:-1]))
+    # Grows from its first term, whose layout in memory is that of the stack.
+    total: Floats | float = 0.0
     for row in range(axes):
         factors: list[Floats] = []
         for column in range(row):
@@ -33,8 +34,8 @@ def half_log_evidence(precision: Floats, information: Floats) -> Floats:
         factors.append(root)
         rows.append(factors)
         solved.append(residual / root)
-        total += 0.5 * solved[row] ** 2 - np.log(root)
-    return total
+        total = total + (0.5 * solved[row] ** 2 - np.log(root))
+    return np.asarray(total)
 
 
 def log_sum_exp(values: Floats, axis: int) -> Floats:

@@ -169,6 +169,38 @@ def test_rates_bands_and_sigmas_are_numbers_above_zero(value):
     refused("sigma of channel 'a' is .*above zero", channel={"sigma": value})
 
 
+def three_axes(sigma) -> Channel:
+    return Channel("a", "a", ("vx", "vy", "wz"), 1, sigma)
+
+
+def test_a_channel_may_have_a_sigma_for_each_axis():
+    alike, own = three_axes(0.1), three_axes((0.1, 0.1, 0.2))
+    assert (alike.sigmas, own.sigmas) == ((0.1, 0.1, 0.1), (0.1, 0.1, 0.2))
+    assert (alike.sigma_text, own.sigma_text) == ("0.1", "0.1, 0.1, 0.2")
+    scheme = small_scheme(channels=(own,))
+    assert "sigma = [0.1, 0.1, 0.2]" in scheme_text(scheme)
+    assert scheme_from_table(table_of(scheme)) == scheme
+    assert len({scheme.fingerprint, small_scheme(channels=(alike,)).fingerprint}) == 2
+
+
+def test_some_axes_of_a_channel_keep_their_own_sigmas():
+    own = three_axes((0.1, 0.15, 0.2))
+    assert (own.on(("vx", "vy")).sigmas, own.on(("wz",)).sigmas) == ((0.1, 0.15), (0.2,))
+    assert three_axes(0.1).on(("wz",)) == Channel("a", "a", ("wz",), 1, 0.1)
+
+
+@pytest.mark.parametrize("sigma", [(), (0.1,), (0.1, 0.2), (0.1, 0.2, 0.3, 0.4)])
+def test_sigmas_are_one_for_all_axes_or_one_for_each(sigma):
+    with pytest.raises(MtmError, match="has 3 axes and .* sigmas; give one sigma for all axes, or one for each"):
+        small_scheme(channels=(three_axes(sigma),))
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), "1", None, True])
+def test_each_axis_s_sigma_is_a_number_above_zero(value):
+    with pytest.raises(MtmError, match="sigma of axis 2 of channel 'a' is .*above zero"):
+        small_scheme(channels=(three_axes((0.1, value, 0.2)),))
+
+
 @pytest.mark.parametrize("value", [-1, 1.5, "1", None, True, 1 << 63])
 def test_counts_are_whole_numbers_of_63_bits(value):
     refused("alphabet_size is .*whole number", alphabet_size=value)

@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mtm_onboard.model.velocity import STOP, BodyVelocity
-from mtm_onboard.protocol import MtmError
+from mtm_onboard.protocol import Channel, MtmError
 from mtm_onboard.protocol.journal_file import CLAMPED, HELD, NOISE, REFUSED, STALE, STOPPED, UNSENT
-from mtm_onboard.runtime.guard import Guard, Limits, Staleness
+from mtm_onboard.runtime.guard import Guard, Limits, Staleness, body_sigmas
 
 BASE = BodyVelocity(0.3, -0.1, 0.5)
 NOISY = BodyVelocity(0.35, -0.2, 0.5)
@@ -141,6 +141,19 @@ def test_noise_is_bounded_in_multiples_of_sigma():
     _, sent = tick(guard, STOP, BodyVelocity(0.5, -0.1, -0.3))
     assert sent == pytest.approx((0.2, -0.1, -0.2))
     assert guard.flags == NOISE | CLAMPED
+
+
+def test_each_axis_s_noise_is_bounded_by_its_own_sigma():
+    bounds = Limits(1.0, 2.0, noise_sigmas=2.0)
+    guard = Guard(bounds, Staleness(), noise_sigma=(0.1, 0.0, 0.2), period_s=0.02)
+    _, sent = tick(guard, STOP, BodyVelocity(0.5, 0.3, -0.5))
+    assert sent == pytest.approx((0.2, 0.0, -0.4))
+
+
+def test_a_body_s_sigmas_are_those_of_its_channels():
+    channels = [Channel("a", "a", ("wz", "vx"), 1, (0.2, 0.1)), Channel("b", "a", ("joint",), 1, 3.0)]
+    assert body_sigmas(channels) == (0.1, 0.0, 0.2)
+    assert body_sigmas([]) == (0.0, 0.0, 0.0)
 
 
 def test_noise_is_bounded_by_four_sigma_unless_said_otherwise():
