@@ -1,6 +1,7 @@
 """A robot whose time of day jumps: no slot is played twice, and each jump is told in one sentence."""
 
 import math
+import random
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import date, timedelta
@@ -194,6 +195,36 @@ def test_a_power_cut_and_an_old_clock_play_nothing_again(day, monkeypatch, ahead
     second = day.run(40.0, ahead_s)
     assert repeated(first, second) == 0
     assert len(second[0]) > 50 * 10
+
+
+@pytest.mark.parametrize("step_s", [HOUR_S, -2 * HOUR_S])
+def test_a_step_at_the_very_start_plays_nothing_again(day, step_s):
+    """Before the first slot has begun, between the plan and the slot that it is for."""
+    first = day.run(20.0)
+    second = day.run(20.0, 0.0, (0.05, step_s))
+    assert repeated(first, second) == 0
+    way = "forward" if step_s > 0 else "back"
+    known = f"the time of day was set {way} by {abs(step_s):.1f} s: no noise until it is known to be right"
+    assert [text for text in told(second[1]) if "no noise" in text] == [known]
+    assert len(told(second[1])) == 2
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_walk_of_the_clock_plays_a_slot_twice(tmp_path, seed):
+    """Steps either way at any time, restarts and power cuts in any order; each step is told once."""
+    draw, day = random.Random(seed), Day(tmp_path)
+    runs, ahead_s = [], 0.0
+    for _ in range(4):
+        ahead_s += draw.choice([0.0, 0.0, HOUR_S, -2 * HOUR_S, 30.0, -30.0, 2.4])
+        steps = tuple((draw.uniform(0.0, 18.0), draw.choice([HOUR_S, -2 * HOUR_S, 5.0, -5.0])) for _ in range(2))
+        # Two within one look at the clock are told as one.
+        apart = steps if abs(steps[0][0] - steps[1][0]) > 2.5 else steps[:1]
+        runs.append(day.run(24.0, ahead_s, *apart, killed=draw.random() < 0.3))
+        ahead_s += sum(by_s for _, by_s in apart)
+        told_steps = [text for text in told(runs[-1][1]) if "no noise until" in text]
+        assert len(told_steps) == len(apart) or not runs[-1][1]
+    assert repeated(*runs) == 0
+    assert any(noise for noise, *_ in runs)
 
 
 def test_a_clock_that_is_set_wrong_and_right_again(day):

@@ -4,6 +4,7 @@ import pytest
 
 pytest.importorskip("vmas")
 
+from hil.experiments.attacks.codebook_learning import PERMUTED, PRESENT, ROLLING
 from hil.experiments.attacks.registry import ATTACKS, measure_attack
 
 
@@ -30,3 +31,10 @@ def test_what_suppresses_or_forges_leaves_coherency_near_chance(name, arm, level
 
 def test_a_learnt_codebook_forges_under_the_fixed_schedule():
     assert measured("codebook_learning", "fixed schedule", 4.0)["matched right"] >= 12
+
+
+def test_an_order_of_its_own_in_each_slot_forges_presence_but_no_symbol():
+    found = measured("codebook_learning", PERMUTED, 4.0)
+    assert found["matched right"] <= 6
+    assert found[f"{PRESENT} right"] >= 10
+    assert measured("codebook_learning", ROLLING, 4.0)["matched margin"] < 2.0 < found["matched margin"]

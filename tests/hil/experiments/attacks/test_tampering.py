@@ -159,6 +159,20 @@ def test_mean_windows_are_sorted_by_symbol_and_as_loud_as_noise(noise):
         assert int(np.argmax(fit)) == symbol
 
 
+def test_windows_in_another_order_each_time_are_told_by_likeness(noise):
+    """What is learnt has the order of the first rollout, whatever the later ones were said to say."""
+    goals = np.array([goals_of(seed) for seed in range(ROLLOUTS)])
+    orders = np.array([np.roll(np.arange(8), number) for number in (3, 5, 6)])
+    book = codebook_of(7)
+    played = np.stack([noise_of(book, order[own]) for order, own in zip(orders, goals, strict=True)])
+    learnt = mean_windows(played, goals, by_likeness=True)
+    truth = noise_of(book, np.arange(8)).reshape(8, -1, 2)
+    inner = slice(20, 100)
+    for symbol in range(8):
+        fit = [abs(np.corrcoef(learnt[symbol, inner].ravel(), other[inner].ravel())[0, 1]) for other in truth]
+        assert int(np.argmax(fit)) == orders[0, symbol]
+
+
 def test_a_discriminant_tells_noise_from_none_not_from_itself():
     draw = np.random.default_rng(6)
     quiet, loud, louder = (scale * draw.standard_normal((200, 64, 2)) for scale in (1.0, 2.0, 2.0))
