@@ -454,8 +454,28 @@ def endurance(
         run(hours, checkpoints, seed, out, console)
 
 
+def cost(
+    *,
+    keys: Annotated[list[Path], typer.Argument(metavar="KEY...", help="Keys whose noise is driven with.")],
+    drives: Annotated[int, typer.Option("-n", metavar="N", min=2, help="Drives under each noise.")] = 200,
+    seed: FirstSeed = 60_000,
+    workers: Workers = None,
+    out: OutCsv = None,
+    force: Force = False,
+    cells: Cells = CELLS_FOLDER / "cost.jsonl",
+) -> None:
+    """Measure what noise costs the RoboMaster's task: time, path, heading, energy and jerk, beside white noise.
+
+    Stop it at any time: what is finished is kept, and the next run goes on.
+    """
+    with reported_console("mtm-hil cost", out, force=force) as console:
+        from hil.commands.cost import cost as run
+
+        run(keys, drives, seed, console, workers=workers, out=out, cells=cells)
+
+
 # In the order in which --help lists them.
 EXPERIMENTS: tuple[Callable[..., None], ...] = (
     calibrate, bench, cameras, false_alarms, messages, disclosures, frames, shim, robustness, sweep, real, identify,
-    faults, fuzz, forgeries, attacks, endurance,
+    faults, fuzz, forgeries, attacks, cost, endurance,
 )  # fmt: skip

@@ -1,0 +1,1 @@
+"""What noise costs the RoboMaster's task."""

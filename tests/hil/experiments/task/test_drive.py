@@ -1,0 +1,49 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hil.experiments.task.drive import CLEAN, KEYED, WHITE, distances_m, drive
+from hil.worlds.robomaster import fleet_scheme
+from mtm_onboard.protocol import Channel, MtmError
+
+SCHEME = fleet_scheme()
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return {condition: drive(SCHEME, condition, 5) for condition in (CLEAN, WHITE, KEYED)}
+
+
+def test_distances_are_those_of_the_nearest_part_of_the_route():
+    corners = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]])
+    places = np.array([[1.0, 0.5], [3.0, 0.5], [-3.0, 4.0], [2.0, 0.25]])
+    assert distances_m(places, corners) == pytest.approx([0.5, 1.0, 5.0, 0.0])
+
+
+def test_a_robot_arrives_under_every_noise(drives):
+    for driven in drives.values():
+        assert 25.0 < driven.time_s < 45.0
+        assert 0.0 < driven.path_error_m < 0.2
+
+
+def test_noise_adds_its_power_to_the_energy(drives):
+    added = [drives[condition].energy_m2ps2 - drives[CLEAN].energy_m2ps2 for condition in (WHITE, KEYED)]
+    assert added == pytest.approx([0.02, 0.02], abs=0.006)
+
+
+def test_noise_of_a_band_jerks_less_than_white_noise(drives):
+    # The controller's own, at the corners, is there as well.
+    white, keyed = (drives[name].jerk_mps3 ** 2 - drives[CLEAN].jerk_mps3 ** 2 for name in (WHITE, KEYED))
+    assert 0.0 < keyed < 0.02 * white
+
+
+def test_a_drive_is_the_same_for_the_same_seed(drives):
+    assert drive(SCHEME, KEYED, 5) == drives[KEYED]
+    assert drive(SCHEME, KEYED, 6) != drives[KEYED]
+
+
+def test_a_joint_s_noise_drives_no_robot():
+    scheme = replace(SCHEME, channels=(Channel("arm", "arm", ("joint1",), 1, 0.1),))
+    with pytest.raises(MtmError, match="can be added to a body velocity"):
+        drive(scheme, KEYED, 5)
