@@ -53,7 +53,7 @@ def signal_to_motion(scheme: Scheme, profile: PlantProfile) -> tuple[np.ndarray,
     share, (axes of all channels, K).
     """
     known = {axis.name: axis for axis in profile.axes}
-    asked = [(axis, channel.sigma) for channel in scheme.channels for axis in channel.axes]
+    asked = [pair for channel in scheme.channels for pair in zip(channel.axes, channel.sigmas, strict=True)]
     lacking = [axis for axis, _ in asked if axis not in known]
     if lacking:
         raise MtmError(

@@ -44,6 +44,6 @@ def displacement_m(channel: Channel, scheme: Scheme) -> float:
     """
     if scheme.spectrum is not None:
         tones_hz, powers = channel_tones(scheme, channel)
-        return float(channel.sigma * np.sqrt(np.mean(powers / (2.0 * np.pi * tones_hz) ** 2)))
+        return float(min(channel.sigmas) * np.sqrt(np.mean(powers / (2.0 * np.pi * tones_hz) ** 2)))
     low_hz, high_hz = scheme.band_hz
     return float(min(channel.sigmas) / (2.0 * np.pi * np.sqrt(low_hz * high_hz)))
