@@ -35,7 +35,7 @@ def test_a_robot_that_is_slow_gets_its_noise_at_low_frequencies():
     assert shaping.proposed_bps > 0.98 * shaping.best_bps
 
 
-def test_axes_share_one_spectrum_and_each_counts_with_its_own_noise():
+def test_axes_share_a_spectrum_and_count_with_their_own_noise():
     both = replace(SCHEME, channels=(Channel("robot0", "robot0", ("vx", "wz"), 1, 0.05),))
     frequencies_hz, ratios = signal_to_motion(both, profile(SLOW, BUSY))
     assert ratios.shape == (2, len(frequencies_hz))

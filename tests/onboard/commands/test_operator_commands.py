@@ -370,3 +370,20 @@ def test_a_spectrum_that_cannot_be_is_a_usage_error(tmp_path, capsys, text):
     assert code == 2
     assert "spectrum" in capsys.readouterr().err
     assert not (tmp_path / "robot.key").exists()
+
+
+@pytest.mark.parametrize(
+    ("preset", "shown"),
+    [
+        ("fast", ("band          0.5 to 5 Hz", "alphabet      4096 symbols", "message       400 ticks, 8 s, 16 symbols",
+                  "64 bits, 8 bits/s", "tag of 32 bits", "7 of 16 code symbols parity", "sigma 0.1")),
+        ("quiet", ("band          0.5 to 2.5 Hz", "alphabet      256 symbols", "combine same", "tag of 24 bits",
+                   "body robot0, axes vx, ", "sigma 0.02", "body robot0, axes wz, ", "sigma 0.1")),
+    ],
+)  # fmt: skip
+def test_presets_are_whole_schemes_with_a_tag(tmp_path, capsys, preset, shown):
+    assert keygen(tmp_path, "--preset", preset) == 0
+    assert main(["show", "--key", str(tmp_path / "robot.key")]) == 0
+    out = capsys.readouterr().out
+    assert [fact for fact in shown if fact not in out] == []
+    assert "schedule rolling" in out
