@@ -46,6 +46,10 @@ def bench(
         typer.Option(metavar="NAMES", help="Other robots instead: all, or names and plant files parted by commas."),
     ] = None,
     ticks: Annotated[int, typer.Option(metavar="TICKS", min=10, help="With --plants: window of a symbol.")] = 100,
+    rates: Annotated[
+        str | None,
+        typer.Option(metavar="NAMES", help="5 to 8 bits/s a robot instead: all, or names such as 4096x120."),
+    ] = None,
     out: OutCsv = None,
     force: Force = False,
     plot: Annotated[
@@ -56,6 +60,10 @@ def bench(
     """Compare the paper's detector and ours with the genie, an oracle, on the same recordings."""
     if plants is not None and (quick or plot is not None):
         raise typer.BadParameter("--quick and --plot do not go with --plants; take fewer --rollouts for a first look")
+    if rates is not None and (quick or plot is not None or plants is not None):
+        raise typer.BadParameter(
+            "--quick, --plot and --plants do not go with --rates; take fewer --rollouts for a first look"
+        )
     with reported_console("mtm-hil bench", out, plot, force=force) as console:
         if plants is not None:
             from hil.commands.bench_plants import PlantsOptions, bench_plants
@@ -64,6 +72,11 @@ def bench(
             job = PlantJob(ticks=ticks)
             asked = PlantsOptions(plants=plants, job=job, rollouts=rollouts, out=out, cells=cells)
             bench_plants(asked, console)
+            return
+        if rates is not None:
+            from hil.commands.bench_rates import RatesOptions, bench_rates
+
+            bench_rates(RatesOptions(rates, rollouts, out, cells), console)
             return
         from hil.commands.bench import BenchOptions
         from hil.commands.bench import bench as run
