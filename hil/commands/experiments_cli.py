@@ -49,6 +49,10 @@ def bench(
     spectra: Annotated[
         bool, typer.Option("--spectra", help="What the noise's spectrum is worth at 6 bits/s instead.")
     ] = False,
+    rates: Annotated[
+        str | None,
+        typer.Option(metavar="NAMES", help="5 to 8 bits/s a robot instead: all, or names such as 4096x120."),
+    ] = None,
     out: OutCsv = None,
     force: Force = False,
     plot: Annotated[
@@ -63,6 +67,10 @@ def bench(
         )
     if plants is not None and (quick or plot is not None):
         raise typer.BadParameter("--quick and --plot do not go with --plants; take fewer --rollouts for a first look")
+    if rates is not None and (quick or plot is not None or plants is not None or spectra):
+        raise typer.BadParameter(
+            "--quick, --plot, --plants and --spectra do not go with --rates; take fewer --rollouts for a first look"
+        )
     with reported_console("mtm-hil bench", out, plot, force=force) as console:
         if plants is not None:
             from hil.commands.bench_plants import PlantsOptions, bench_plants
@@ -76,6 +84,11 @@ def bench(
             from hil.commands.bench_spectra import SpectraOptions, bench_spectra
 
             bench_spectra(SpectraOptions(rollouts, out, cells), console)
+            return
+        if rates is not None:
+            from hil.commands.bench_rates import RatesOptions, bench_rates
+
+            bench_rates(RatesOptions(rates, rollouts, out, cells), console)
             return
         from hil.commands.bench import BenchOptions
         from hil.commands.bench import bench as run

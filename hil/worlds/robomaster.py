@@ -22,7 +22,7 @@ ROBOTS = 4
 BASE_SPEED_MPS = 0.5
 
 _GAIN_PER_S = 1.5
-_HEADING_GAIN_PER_S = 2.0
+HEADING_GAIN_PER_S = 2.0
 _ARRIVAL_M = 0.15
 _SPACING_M = 0.55
 _SWEEP_M = 2.4
@@ -146,5 +146,5 @@ def heading_held(vx_mps: float, vy_mps: float, heading_rad: float) -> BodyVeloci
     return BodyVelocity(
         cosine * vx_mps + sine * vy_mps,
         cosine * vy_mps - sine * vx_mps,
-        -_HEADING_GAIN_PER_S * math.remainder(heading_rad, math.tau),
+        -HEADING_GAIN_PER_S * math.remainder(heading_rad, math.tau),
     )

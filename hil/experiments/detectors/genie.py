@@ -44,12 +44,12 @@ def tick_responses(plant: MecanumParameters, onset_s: float, rate_hz: float, tic
     """(bins, ticks): mean velocity, m/s, in each time bin of `motion` for a command of 1 m/s held over one tick."""
     edges_s = motion.start_s + np.arange(len(motion.seen) + 1) * motion.step_s
     since_s = edges_s[:, None] - (onset_s + np.arange(ticks) / rate_hz)
-    moved_m = _step_displacement_m(plant, since_s) - _step_displacement_m(plant, since_s - 1.0 / rate_hz)
+    moved_m = step_displacement_m(plant, since_s) - step_displacement_m(plant, since_s - 1.0 / rate_hz)
     responses: Floats = np.diff(moved_m, axis=0) / motion.step_s
     return responses
 
 
-def _step_displacement_m(plant: MecanumParameters, since_s: Floats) -> Floats:
+def step_displacement_m(plant: MecanumParameters, since_s: Floats) -> Floats:
     """Displacement, m, of the chassis `since_s` after a command of 1 m/s from rest."""
     # The motion controller hands a command on one period after it came; the physics takes each step at the velocity
     # of the step's end.

@@ -84,6 +84,23 @@ class WindowTones:
         """Real parts and negative imaginary parts of all candidates' tones, (M, axes, 2 K)."""
         return stacked_tones(self._codebook, self._channel, self._number)
 
+    def ratios(self, linear: Floats, quadratic: Floats) -> Floats:
+        """T . linear - t' quadratic t / 2 of each candidate's tones t, all axes' side by side as in `of`: (M,)."""
+        count, axes, width = self.shape
+        if count <= WHOLE:
+            flat = self._held.reshape(count, axes * width)
+            return np.asarray(flat @ linear - 0.5 * np.einsum("lk,lk->l", flat @ quadratic, flat))
+        # Imaginary parts have the other sign in what is kept.
+        sign = np.tile(np.repeat([1.0, -1.0], width // 2), axes)
+        pull, bend = (sign * linear).astype(np.float32), (np.outer(sign, sign) * quadratic).astype(np.float32)
+        whole = self.whole.reshape(count, axes * width)
+        return np.concatenate(
+            [
+                (block @ pull - np.float32(0.5) * np.einsum("lk,lk->l", block @ bend, block)).astype(np.float64)
+                for block in np.array_split(whole, -(-count // _BLOCK))
+            ]
+        )
+
     def of(self, symbols: Integers) -> Floats:
         """Real and imaginary parts of the symbols' tones, side by side: (symbols, axes, 2 K)."""
         return self._held[symbols] if len(self) <= WHOLE else self._derived(symbols.tolist())

@@ -13,12 +13,19 @@ import numpy as np
 from scipy.special import log_softmax, softmax
 
 from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, half_log_evidence, log_sum_exp
-from mtm_audit.detectors.matched.first_pass import first_pass
+from mtm_audit.detectors.matched.first_pass import KEPT, first_pass
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import NoiseModel, fit_noise_by_axis, model_order
 from mtm_audit.detectors.matched.plants import COARSE, FINE
 from mtm_audit.detectors.matched.profile import PlantProfile, log_prior
-from mtm_audit.detectors.matched.windows import Statistics, Window, response_rows, statistics
+from mtm_audit.detectors.matched.windows import (
+    Statistics,
+    Window,
+    pulled_by,
+    response_rows,
+    statistics,
+    whitened_from_start,
+)
 from mtm_audit.model.track import Floats
 
 _ROUNDS = 3
@@ -32,7 +39,7 @@ class _Judged:
     kept: np.ndarray
     rows: Floats
     ratios: Floats  # (L,) log-likelihood ratios of the kept candidates, nats
-    first_pass: Floats  # (M,) log-likelihood ratios of all candidates under the prior alone
+    overview: Floats  # (M,) log-likelihood ratios of all candidates, roughly: under the prior, then under one plant
     belief: Floats  # (L,) probabilities of the kept candidates, all repeats taken together
     signal: Floats  # (observed axes, n) expected contribution to the motion
 
@@ -67,7 +74,7 @@ def estimate(
     """
     prior, first_prior = log_prior(profile, FINE), log_prior(profile, COARSE)
     judged = _first_look(windows, motions, noise, first_prior)
-    for _ in range(_ROUNDS):
+    for look in range(_ROUNDS):
         _believe(judged)
         found = _all_statistics(judged, motions, noise)
         for _ in range(2):
@@ -76,6 +83,8 @@ def estimate(
         _expect_signals(judged, hypotheses, noise)
         residuals = _residuals(judged, motions)
         noise = fit_recording_noise(motions, residuals)
+        if look == 0:
+            _look_again(judged, hypotheses, motions, noise)
     ratios, signals = zip(*[(_all_candidates(state), state.signal) for state in judged], strict=True)
     return Estimate(ratios, signals, tuple(residuals), noise, _shared_plants(judged, found, prior))
 
@@ -215,17 +224,55 @@ def _expect_signals(judged: Sequence[_Judged], hypotheses: Sequence[list[_Hypoth
     for state, alternatives in zip(judged, hypotheses, strict=True):
         tones = np.einsum("l,lak->ak", state.belief, state.window.tones.of(state.kept))
         heard = np.einsum("ak,pkn->pan", tones, state.rows)
-        weights = softmax([float(log_sum_exp(item.ratios, axis=0)) for item in alternatives])
-        gains = sum(
-            weight * item.plants[..., None] * item.gains for weight, item in zip(weights, alternatives, strict=True)
-        )
         scales = noise.scales[state.window.observation]
-        state.signal = np.einsum("dpa,pan->dn", gains, heard) * scales[:, None]
+        state.signal = np.einsum("dpa,pan->dn", _mean_gains(alternatives), heard) * scales[:, None]
+
+
+def _mean_gains(alternatives: Sequence[_Hypothesis]) -> Floats:
+    """Gains times the plants' probabilities, expected over the hypotheses: (observed axes, plants, A)."""
+    weights = softmax([float(log_sum_exp(item.ratios, axis=0)) for item in alternatives])
+    return np.asarray(
+        sum(weight * item.plants[..., None] * item.gains for weight, item in zip(weights, alternatives, strict=True))
+    )
+
+
+def _look_again(
+    judged: Sequence[_Judged], hypotheses: Sequence[list[_Hypothesis]], motions: Sequence[Motion], noise: NoiseModel
+) -> None:
+    """Choose anew which candidates are kept, of all, under the one plant that the other windows show by now.
+
+    Under the prior alone the symbol that was sent may stand behind many others of a large alphabet.
+    """
+    if all(len(state.kept) == len(state.overview) for state in judged):
+        return
+    residuals = _residuals(judged, motions)
+    known = {id(state): alternatives for state, alternatives in zip(judged, hypotheses, strict=True)}
+    for members in _groups(judged):
+        for state in members:
+            state.overview = _under_one_plant(state, _mean_gains(known[id(state)]), residuals, noise)
+        kept = np.argsort(-np.sum([state.overview for state in members], axis=0))[:KEPT]
+        for state in members:
+            state.kept, state.ratios = kept, state.overview[kept]
+
+
+def _under_one_plant(state: _Judged, gains: Floats, residuals: Sequence[Floats], noise: NoiseModel) -> Floats:
+    """Log-likelihood ratios (M,) of all candidates of a window where the response is known."""
+    window = state.window
+    own = residuals[window.observation].copy()
+    own[:, window.first : window.last] += state.signal
+    pulled, weights, filters, history = pulled_by(window, noise, own)
+    responses = np.einsum("dpa,pkn->dakn", gains, state.rows, optimize=True)
+    linear, quadratic = np.zeros(responses[0, ..., 0].size), 0.0
+    for axis in range(len(pulled)):
+        heard = whitened_from_start(responses[axis], history, filters[axis]).reshape(len(linear), -1)
+        linear += heard @ pulled[axis]
+        quadratic = quadratic + (heard * weights[axis]) @ heard.T
+    return window.tones.ratios(linear, np.asarray(quadratic))
 
 
 def _all_candidates(state: _Judged) -> Floats:
-    """Ratios of all M candidates: those dropped after the first pass stand below the worst that was kept."""
-    full = state.first_pass - state.first_pass[state.kept].min() + state.ratios.min()
+    """Ratios of all M candidates: those dropped after a look at all stand below the worst that was kept."""
+    full = state.overview - state.overview[state.kept].min() + state.ratios.min()
     full = np.minimum(full, state.ratios.min())
     full[state.kept] = state.ratios
     return np.asarray(full)

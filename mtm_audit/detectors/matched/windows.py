@@ -144,12 +144,12 @@ def pulled_by(window: Window, noise: NoiseModel, residual: Floats) -> tuple[Floa
 def whitened_by_filter(signals: Floats, filters: Floats, history: int) -> list[tuple[NDArray[np.int64], Floats]]:
     """Signals whitened from silence, once for each filter and the observed axes that have it."""
     return [
-        (np.flatnonzero(np.all(filters == own, axis=1)), _whitened_from_start(signals, history, own))
+        (np.flatnonzero(np.all(filters == own, axis=1)), whitened_from_start(signals, history, own))
         for own in np.unique(filters, axis=0)
     ]
 
 
-def _whitened_from_start(signals: Floats, history: int, whitening_filter: Floats) -> Floats:
+def whitened_from_start(signals: Floats, history: int, whitening_filter: Floats) -> Floats:
     """Whiten signals (plants, rows, n) that were silent in the `history` cells before their first."""
     silent = np.zeros((*signals.shape[:2], history))
     return whitened(np.concatenate([silent, signals], axis=2), whitening_filter)
