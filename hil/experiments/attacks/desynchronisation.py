@@ -2,6 +2,9 @@
 
 A slow warp swings the delay to and fro once in two symbols; its level is the largest delay. Skipped and repeated ticks
 move it by a tick at random instants; the level is how many there are in a symbol's 120 ticks.
+
+Of a warp the matched detector is also told each window's mean delay, and the line that its delay follows best: what a
+detector would gain that found them itself.
 """
 
 from collections.abc import Mapping
@@ -59,7 +62,15 @@ def _measure(arm: str, level: float, rollouts: int, seed: int) -> Mapping[str, S
     def make(count: int, draw: np.random.Generator) -> Tamper:
         return delayed(warp(level, count) if arm == WARP else slips(level, count, draw))
 
-    return suppressed(make, rollouts, seed)
+    return suppressed(make, rollouts, seed, told=delays_told(warp(level, 1)[:, 0]) if arm == WARP else None)
+
+
+def delays_told(delays_ticks: Floats) -> dict[str, Floats]:
+    """(windows, 2) each, delay at a window's beginning in seconds and its growth in seconds a second, of (ticks,)."""
+    windows = delays_ticks.reshape(-1, SCHEME.message_ticks)
+    lines = np.stack([np.polyfit(np.arange(SCHEME.message_ticks), own, 1)[::-1] for own in windows])
+    means = np.stack([windows.mean(axis=1), np.zeros(len(windows))], axis=1)
+    return {name: own / [SCHEME.rate_hz, 1.0] for name, own in (("mean delays", means), ("delays and drifts", lines))}
 
 
 ATTACK = Attack(

@@ -5,7 +5,7 @@ symbol on both axes, keys and starts of their own in each rollout. The agent is 
 tracker observe it: at its true position, with that tracker's error.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -70,12 +70,12 @@ def observed_m(rollout: Rollout, seed: int) -> Floats:
     return np.asarray(states_m + TRACKER_ERROR_M * draw.standard_normal(states_m.shape))
 
 
-def scores_of(codebook: Codebook, rollout: Rollout, seed: int, reader: str) -> Floats:
-    """(goals, M): how well each candidate fits each goal's window."""
+def scores_of(codebook: Codebook, rollout: Rollout, seed: int, reader: str, delays: Floats | None = None) -> Floats:
+    """(goals, M): how well each candidate fits each goal's window; `delays` as `read_windows` takes them."""
     times_s = rollout.shots[0].times_s
     track = Track("agent", times_s, observed_m(rollout, seed), np.ones(len(times_s), dtype=np.bool_))
     seen = ObservedShot(float(times_s[0]), range(len(times_s) - 1), {"agent": glimpse_of_track(track)})
-    return read_windows(codebook, [seen], POINT.goals, reader)[0]
+    return read_windows(codebook, [seen], POINT.goals, reader, delays)[0]
 
 
 def suppressed(
@@ -84,8 +84,12 @@ def suppressed(
     seed: int,
     injected: Injected | None = None,
     scheme: Scheme = SCHEME,
+    told: Mapping[str, Floats] | None = None,
 ) -> dict[str, Scalar]:
-    """What is left of the messages when the tampering of so many rollouts is made by `tamper(rollouts, draw)`."""
+    """What is left of the messages when the tampering of so many rollouts is made by `tamper(rollouts, draw)`.
+
+    `told` has delays as `read_windows` takes them, with which the matched detector reads once more, by what it is told.
+    """
     seeds = range(seed, seed + rollouts)
     draw = np.random.default_rng([_KEYS_STREAM, _GOALS_STREAM, seed])
     goals, books = np.array([goals_of(own) for own in seeds]), [codebook_of(own, scheme) for own in seeds]
@@ -93,7 +97,11 @@ def suppressed(
     if injected is not None:
         noise = injected(noise, draw)
     driven = drive(goals, noise, seeds, tamper(rollouts, draw))
-    return {**read_all(books, driven, goals, seeds), **costs(driven, goals)}
+    found = {**read_all(books, driven, goals, seeds), **costs(driven, goals)}
+    for what, delays in (told or {}).items():
+        scores = [scores_of(*each, MATCHED, delays) for each in zip(books, driven, seeds, strict=True)]
+        found |= _counted(f"{MATCHED}, told {what}", scores, goals)
+    return found
 
 
 def read_all(
@@ -102,12 +110,17 @@ def read_all(
     """Messages tried and right and the mean margin between the best candidate and the next, for each reader."""
     result: dict[str, Scalar] = {}
     for reader in READERS:
-        scores = [scores_of(*each, reader) for each in zip(books, driven, seeds, strict=True)]
-        best = np.sort(np.concatenate(scores), axis=1)
-        result[f"{reader} {TRIALS}"] = goals.size
-        result[f"{reader} {RIGHT}"] = int(np.sum(np.argmax(np.concatenate(scores), axis=1) == goals.ravel()))
-        result[f"{reader} {MARGIN}"] = float(np.mean(best[:, -1] - best[:, -2]))
+        result |= _counted(reader, [scores_of(*each, reader) for each in zip(books, driven, seeds, strict=True)], goals)
     return result
+
+
+def _counted(reader: str, scores: Sequence[Floats], goals: Integers) -> dict[str, Scalar]:
+    best = np.sort(np.concatenate(scores), axis=1)
+    return {
+        f"{reader} {TRIALS}": goals.size,
+        f"{reader} {RIGHT}": int(np.sum(np.argmax(np.concatenate(scores), axis=1) == goals.ravel())),
+        f"{reader} {MARGIN}": float(np.mean(best[:, -1] - best[:, -2])),
+    }
 
 
 def costs(driven: Sequence[Rollout], goals: Integers) -> dict[str, Scalar]:

@@ -47,10 +47,11 @@ def line_of(row: Row) -> str:
 
 def draw_plot(path: Path, groups: Sequence[Sequence[Row]]) -> None:
     """A panel for each attack; points have exact 95 % intervals, crosses are the paper's."""
-    down = -(-len(groups) // _ACROSS)
-    figure = Figure(figsize=(5.2 * _ACROSS, 4.0 * down), dpi=80, layout="constrained")
+    across = min(_ACROSS, len(groups))
+    down = -(-len(groups) // across)
+    figure = Figure(figsize=(5.2 * across, 4.0 * down), dpi=80, layout="constrained")
     FigureCanvasAgg(figure)
-    panels = np.atleast_2d(figure.subplots(down, _ACROSS)).ravel()
+    panels = np.atleast_2d(figure.subplots(down, across)).ravel()
     for panel, rows in zip(panels, groups, strict=False):
         _panel(panel, rows)
     for panel in panels[len(groups) :]:

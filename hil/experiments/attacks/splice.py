@@ -35,5 +35,5 @@ def _measure(arm: str, level: float, rollouts: int, seed: int) -> Mapping[str, S
 
 ATTACK = Attack(
     name="splice", level="foreign windows of ten", counted=AUTHENTICATED, levels={ARM: _LEVELS}, measure=_measure,
-    chance_percent=0.0, share=0.2, batch=5,
+    chance_percent=0.0, share=0.4, batch=5,
 )  # fmt: skip

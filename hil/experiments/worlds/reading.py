@@ -37,16 +37,31 @@ class ObservedShot:
 
 @dataclass(frozen=True)
 class _Place:
-    """One window of one channel: the shot it is in, and when it began."""
+    """One window of one channel: the shot it is in, when it began, and by how much its time goes slower than ours."""
 
     shot: int
     onset_s: float
+    drift: float = 0.0
 
 
-def read_windows(codebook: Codebook, seen: Sequence[ObservedShot], messages: int, detector: str) -> list[Floats]:
-    """For each channel its windows' scores in order, (messages * l_c, M), larger for a likelier symbol."""
+def read_windows(
+    codebook: Codebook, seen: Sequence[ObservedShot], messages: int, detector: str, delays: Floats | None = None
+) -> list[Floats]:
+    """For each channel its windows' scores in order, (messages * l_c, M), larger for a likelier symbol.
+
+    `delays` (windows, 2), for the matched detector and one channel: by how many seconds each window began late, and by
+    how many for each second it is later at its end.
+    """
     scheme = codebook.scheme
     places = [_places(scheme, channel, seen, messages) for channel in scheme.channels]
+    if delays is not None:
+        places = [
+            [
+                _Place(place.shot, place.onset_s + late_s, drift)
+                for place, (late_s, drift) in zip(own, delays, strict=True)
+            ]
+            for own in places
+        ]
     read: Callable[[Codebook, Sequence[ObservedShot], Sequence[list[_Place]]], list[Floats]]
     read = {COHERENCY: _coherency, MATCHED: _matched}[detector]
     return read(codebook, seen, places)
@@ -89,7 +104,7 @@ def _matched(codebook: Codebook, seen: Sequence[ObservedShot], places: Sequence[
         glimpses = [_observed(scheme, channel, shot.glimpses[channel.body]) for shot in seen]
         motions += [uniform_motion(glimpse, scheme.band_hz[1]) for glimpse in glimpses]
         for number, place in enumerate(own):
-            timing = Timing(place.onset_s, scheme.rate_hz)
+            timing = Timing(place.onset_s, scheme.rate_hz / (1.0 + place.drift))
             observation = first + place.shot
             windows.append(make_window(codebook, channel, motions[observation], timing, observation, 0, number, tones))
     result = iter(estimate(windows, motions, fit_recording_noise(motions, [own.velocities for own in motions])).ratios)

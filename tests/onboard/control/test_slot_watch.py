@@ -15,9 +15,12 @@ from mtm_onboard.journal.ledger import Ledger
 from mtm_onboard.links.none import NullLink
 from mtm_onboard.model.velocity import STOP, BodyVelocity
 from mtm_onboard.protocol import Key, MtmError
+from mtm_onboard.protocol.disclosure import anchor_of
 from mtm_onboard.protocol.key import generate_master
+from mtm_onboard.protocol.public_channel import public_key
 from mtm_onboard.protocol.slots import slot_at
 from mtm_onboard.runtime.config import config_from_table
+from mtm_onboard.runtime.message import message_of
 from mtm_onboard.runtime.source import Command, Source
 from tests.onboard.schemes import FAKE_SECRET, small_scheme
 
@@ -72,6 +75,7 @@ class Day:
     folder: object
     began_s: float = 0.0
     key: Key = KEY
+    message: int | bytes = 7
 
     def run(self, seconds: float, ahead_s: float = 0.0, *steps: tuple[float, float], killed: bool = False):
         """One run whose clock is ahead by so much, and is set by `steps`: (seconds since its start, by how much)."""
@@ -100,7 +104,7 @@ class Day:
 
         path = None
         with suppress(PowerCutError):
-            path = run_session(config, self.key, Plan(7), ended, ends, said.append).journal.path
+            path = run_session(config, self.key, Plan(self.message), ended, ends, said.append).journal.path
         self.began_s += seconds
         events = [] if path is None else [event.text for event in read_journal(path).events]
         return link.noise, events, said
@@ -277,6 +281,33 @@ def test_a_step_to_a_day_without_a_key_is_told_and_silent(tmp_path):
     # The right time again: what follows was not played before.
     assert repeated((noise,)) == 0
     assert any(unix_s > NOON_UNIX_S + 45.0 for unix_s, _ in noise)
+
+
+def test_a_disclosed_key_is_played_between_a_robot_s_own_messages(tmp_path):
+    """By the public channel's slots, and with a place of its own in the ledger."""
+    master = Key("fake-key", generate_master("fake-key", SCHEME, date(2027, 1, 1), 60).holding, SCHEME)
+    own, public = issued(date(2027, 1, 15), 1), public_key(anchor_of(master))
+    link = master.holding.disclosed(date(2027, 1, 14)).link
+    day = Day(tmp_path, key=own)
+    before = day.run(20.0)
+    day.key, day.message = public, link
+    slot_s = public.scheme.message_ticks / public.scheme.rate_hz
+    noise, events, said = carried = day.run(2.2 * slot_s)
+    day.key, day.message = own, 7
+    after = day.run(20.0)
+    assert repeated(before, carried, after) == 0
+    assert len(noise) > 50 * slot_s
+    assert min(len(run[0]) for run in (before, after)) > 50 * 14
+    assert told(events) == []
+    assert any(f"bytes {link.hex()}" in sentence for sentence in said)
+    # Its first slot, as everybody with the anchor has it.
+    slot = slot_at(noise[0][0] + 0.0101, public.scheme)
+    book, symbols = public.codebook(slot), message_of(link, public).symbols(slot)
+    channel = public.scheme.channels[0]
+    expected = 0.1 * book.samples(channel, 0, [symbols[0]])[0, 0]
+    played = [velocity.vx_mps for _, velocity in noise[: len(expected)]]
+    assert max(abs(one - other) for one, other in zip(played, expected, strict=True)) < 1e-9
+    assert (tmp_path / "r.csv.state").read_text().count("[[keys]]") == 2
 
 
 def test_a_disk_that_is_full_ends_the_noise(day, monkeypatch):

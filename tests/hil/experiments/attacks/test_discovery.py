@@ -5,6 +5,7 @@ import pytest
 pytest.importorskip("vmas")
 
 from hil.experiments.attacks.codebook_learning import PERMUTED, PRESENT, ROLLING
+from hil.experiments.attacks.desynchronisation import WARP
 from hil.experiments.attacks.registry import ATTACKS, measure_attack
 
 
@@ -33,8 +34,14 @@ def test_a_learnt_codebook_forges_under_the_fixed_schedule():
     assert measured("codebook_learning", "fixed schedule", 4.0)["matched right"] >= 12
 
 
-def test_an_order_of_its_own_in_each_slot_forges_presence_but_no_symbol():
+def test_an_order_for_each_slot_leaves_presence_to_forgers():
     found = measured("codebook_learning", PERMUTED, 4.0)
     assert found["matched right"] <= 6
     assert found[f"{PRESENT} right"] >= 10
     assert measured("codebook_learning", ROLLING, 4.0)["matched margin"] < 2.0 < found["matched margin"]
+
+
+def test_a_detector_that_is_told_the_drift_follows_a_slow_warp():
+    found = measured("desynchronisation", WARP, 4.0)
+    assert found["matched, told delays and drifts right"] == 16
+    assert found["matched right"] <= 10

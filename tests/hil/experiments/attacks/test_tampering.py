@@ -159,6 +159,14 @@ def test_mean_windows_are_sorted_by_symbol_and_as_loud_as_noise(noise):
         assert int(np.argmax(fit)) == symbol
 
 
+def test_what_is_told_of_a_delay_is_its_line_in_each_window():
+    ticks = np.arange(TICKS) / 100.0 + 2.0
+    means, lines = desynchronisation.delays_told(ticks).values()
+    # Ten ticks a second, 120 ticks a window.
+    assert np.allclose(lines[1], [0.32, 0.01])
+    assert np.allclose(means[1], [0.3795, 0.0])
+
+
 def test_windows_in_another_order_each_time_are_told_by_likeness(noise):
     """What is learnt has the order of the first rollout, whatever the later ones were said to say."""
     goals = np.array([goals_of(seed) for seed in range(ROLLOUTS)])
