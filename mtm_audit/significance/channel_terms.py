@@ -11,11 +11,12 @@ from mtm_audit.detectors.matched.correlate import Prepared, stacked_tones
 from mtm_audit.detectors.matched.evidence import log_sum_exp
 from mtm_audit.detectors.matched.plants import Plants, joined, plant_family, returning, second_order
 from mtm_audit.detectors.matched.projections import Places, Projections, project
-from mtm_audit.model.timing import Onset, Timing
+from mtm_audit.model.timing import Onset, OnsetRange, Timing
 from mtm_audit.model.track import Floats
 from mtm_audit.significance.gains import Levels, all_levels, orientations
 from mtm_audit.significance.likelihood import Hypotheses, approximate_log_e, log_e, log_e_of, weights
 from mtm_audit.significance.neighbourhood import Span, neighbourhood
+from mtm_audit.significance.other_positions import OtherPositions
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel, Power
 
@@ -43,7 +44,8 @@ class ChannelTerms:
     position each carries. `candidates` (shown positions, k) are the symbols that are looked at, those that score best;
     `tones` (groups, k, injected axes, 2 K) theirs. `shared` when one codebook serves all positions (fixed schedule).
     `timing` is what all channels together found; `alone` and `strength` are what this one found by itself. Channels of
-    one `name` are parts of one, which carry the same symbols on different axes.
+    one `name` are parts of one, which carry the same symbols on different axes. `others` is there where other positions
+    may say when a position's windows began.
     """
 
     name: str
@@ -61,6 +63,7 @@ class ChannelTerms:
     shared: bool
     strength: float
     alone: Timing
+    others: OtherPositions | None = None
     _terms: dict[Timing, "Terms"] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -227,7 +230,15 @@ def channel_terms(
         shared=shared,
         strength=found.strength if reading.alone_strength is None else reading.alone_strength,
         alone=found.timing if reading.alone is None else reading.alone,
+        others=None if apart else _others(codebook, channel, reading.prepared, onset),
     )
+
+
+def _others(codebook: Codebook, channel: Channel, prepared: Prepared, onset: Onset) -> OtherPositions | None:
+    """Where each window has its own waveform and the search for the start has to be paid."""
+    if codebook.scheme.schedule == "rolling" and isinstance(onset, OnsetRange) and channel.symbols > 1:
+        return OtherPositions(codebook, channel, prepared, onset)
+    return None
 
 
 def _terms_at(channel: ChannelTerms, timing: Timing) -> Terms:

@@ -24,6 +24,9 @@ Integers = NDArray[np.int64]
 
 # Of a symbol's weights so much come from the others, the rest from the prior.
 OTHERS = 0.9
+# Other positions are believed so much of the timing at the most.
+_BELIEVED = 0.9
+_LEAST_SHARE = 1e-300
 # How many candidates of a position are weighed exactly.
 _TRIED = 2
 
@@ -55,11 +58,49 @@ def _symbol_nats(own: Sequence[WeighedChannel], showing: Sequence[int], position
     by_prior = sum(_by_prior(own[row], position, symbol) for row in showing)
     if len(showing) > 1:
         by_prior = float(np.logaddexp(by_prior, _together(own, showing, position, symbol)) - np.log(2.0))
-    others = [_by_others(own, row, showing, position, symbol) for row in showing]
-    if any(value is None for value in others):
+    by_others = _told_by_others(own, showing, position, symbol)
+    if by_others is None:
         return by_prior
-    by_others = sum(value for value in others if value is not None)
     return float(np.logaddexp(by_others + np.log(OTHERS), by_prior + np.log(1.0 - OTHERS)))
+
+
+def _told_by_others(own: Sequence[WeighedChannel], showing: Sequence[int], position: int, symbol: int) -> float | None:
+    """Log e-value under weights of others, at the timing that was found and at the one that they show by themselves."""
+    found = [_by_others(own, row, showing, position, symbol, _timing(own, row, showing)) for row in showing]
+    if any(value is None for value in found):
+        return None
+    total = float(sum(value for value in found if value is not None))
+    shown = _shown_timings(own, showing, position)
+    if shown is None:
+        return total
+    share = min(_BELIEVED, float(np.exp(sum(log_share for _, log_share in shown.values()))))
+    timings = [(shown[own[row].channel.name][0], 0.0) for row in showing]
+    apart = [_by_others(own, row, showing, position, symbol, each) for row, each in zip(showing, timings, strict=True)]
+    return float(
+        np.logaddexp(
+            sum(value for value in apart if value is not None) + np.log(max(share, _LEAST_SHARE)),
+            total + np.log1p(-share),
+        )
+    )
+
+
+def _shown_timings(
+    own: Sequence[WeighedChannel], showing: Sequence[int], position: int
+) -> dict[str, tuple[Timing, float]] | None:
+    """By channel name the timing that its other positions show, and how sure they are of it; None where one cannot.
+
+    Which windows show the position must follow from them alone as well.
+    """
+    found: dict[str, tuple[Timing, float]] = {}
+    for row in showing:
+        channel = own[row].channel
+        if _elsewhere(own, row, showing) or channel.others is None or len(channel.shown) == 1:
+            return None
+        if channel.name not in found:
+            found[channel.name] = channel.others.timing_without(position)
+        if not channel.others.shows(found[channel.name][0], channel.span.numbers):
+            return None
+    return found
 
 
 def _together(own: Sequence[WeighedChannel], showing: Sequence[int], position: int, symbol: int) -> float:
@@ -99,18 +140,31 @@ def _by_prior(item: WeighedChannel, position: int, symbol: int) -> float:
     return float(logsumexp(exact + item.chosen[1]))
 
 
+def _elsewhere(own: Sequence[WeighedChannel], row: int, showing: Sequence[int]) -> list[WeighedChannel]:
+    """The channels without the position that may share a hypothesis with this one."""
+    others = [other for number, other in enumerate(own) if number not in showing]
+    return [other for other in others if alike([own[row].channel, other.channel])]
+
+
 def _by_others(
-    own: Sequence[WeighedChannel], row: int, showing: Sequence[int], position: int, symbol: int
+    own: Sequence[WeighedChannel],
+    row: int,
+    showing: Sequence[int],
+    position: int,
+    symbol: int,
+    at: tuple[Timing, float],
 ) -> float | None:
-    """Under weights that channels and positions without this candidate's waveform give; None when there are none."""
+    """Under weights that channels and positions without this candidate's waveform give; None when there are none.
+
+    `at` is the timing to weigh at, and the log prior that it costs.
+    """
     channel = own[row].channel
     place = _column(channel, position, symbol)
-    others = [other for number, other in enumerate(own) if number not in showing]
-    elsewhere = [other for other in others if alike([channel, other.channel])]
+    elsewhere = _elsewhere(own, row, showing)
     mine = len(channel.shown) > 1
     if place is None or not (elsewhere or mine):
         return None
-    timing, paid = _timing(own, row, showing, elsewhere)
+    timing, paid = at
     terms = channel.at(timing)
 
     def said(table_of: TableOf) -> Floats:
@@ -136,15 +190,14 @@ def _by_others(
     return float(logsumexp(exact + shares) + paid)
 
 
-def _timing(
-    own: Sequence[WeighedChannel], row: int, showing: Sequence[int], elsewhere: Sequence[WeighedChannel]
-) -> tuple[Timing, float]:
+def _timing(own: Sequence[WeighedChannel], row: int, showing: Sequence[int]) -> tuple[Timing, float]:
     """The timing to weigh at, and the log prior that it costs.
 
     What other channels found costs nothing. A timing that this channel found itself is a choice that the candidate had
     a part in; the parts of a channel share it and pay once.
     """
     channel = own[row].channel
+    elsewhere = _elsewhere(own, row, showing)
     if elsewhere:
         return anchor([other.channel for other in elsewhere], channel), 0.0
     first = next(number for number in showing if own[number].channel.name == channel.name)
