@@ -4,7 +4,6 @@ Under the rolling schedule every window has a waveform of its own. What windows 
 then independent of a position's wrong candidates, and a candidate that is weighed at their timing pays for no search.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -22,9 +21,38 @@ from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel
 
 # Starts that are weighed with one set of gains for all windows: the best where each window has its own.
-_WEIGHED = 128
-# A neighbourhood reaches so many cells to either side of its timing.
-_REACH = 2
+_WEIGHED = 256
+# Evidence is taken for half of what it says: it knows one plant, and the starts that are weighed were chosen.
+_TEMPER = 0.5
+# Other positions are believed so much of the timing at the most.
+_MOST_SURE = 0.9
+# A start's own weight, and the rest that is spread over so many half cells to either side: a robot's plant delays.
+_KEPT, _SPREAD = 0.5, 4
+# Log weight from which on a timing costs less than a search.
+_COVERS = np.log(1.0 / 32.0)
+# Half cells that a neighbourhood reaches to either side.
+_REACH = 4
+
+
+@dataclass(frozen=True)
+class Told:
+    """`sure`: how far other positions are to be believed; `timings`, each with its log weight, of sum 1 at the most.
+
+    `covers` when the timing that was found is near one of these that has some weight, so that paying for its search
+    would add nothing.
+    """
+
+    sure: float
+    timings: tuple[tuple[Timing, float], ...]
+    covers: bool
+
+
+@dataclass(frozen=True)
+class _Said:
+    """Starts in half cells from the motion's first, (starts,), and their log probabilities."""
+
+    half_cells: NDArray[np.int64]
+    log_shares: Floats
 
 
 @dataclass(frozen=True)
@@ -35,20 +63,27 @@ class OtherPositions:
     channel: Channel
     prepared: Prepared
     bounds: OnsetRange
-    _found: dict[int, tuple[Timing, float]] = field(default_factory=dict, repr=False, compare=False)
+    _said: dict[int, _Said] = field(default_factory=dict, repr=False, compare=False)
 
-    def timing_without(self, position: int) -> tuple[Timing, float]:
-        """The likeliest timing by all windows that do not carry the message's `position`, and its log probability."""
-        if position not in self._found:
-            self._found[position] = self._timing_without(position)
-        return self._found[position]
+    def told(self, position: int, found: Timing, numbers: NDArray[np.int64]) -> Told:
+        """What all windows but those of the message's `position` say of the likeliest timing and of the one near
+        `found`, as far as just the windows `numbers` are seen at them.
 
-    def shows(self, timing: Timing, numbers: Sequence[int] | NDArray[np.int64]) -> bool:
-        """Whether just these windows are seen at that timing."""
-        shown = shown_numbers(self.codebook, self.channel, self.prepared.motion, timing, self.bounds)
-        return np.array_equal(shown, numbers)
+        Weights follow from those windows alone, and so does which windows a timing shows.
+        """
+        if position not in self._said:
+            self._said[position] = self._weighed(position)
+        said = self._said[position]
+        best = int(said.half_cells[np.argmax(said.log_shares)])
+        near = np.abs(said.half_cells - best) <= _REACH
+        sure = min(_MOST_SURE, float(np.exp(logsumexp(said.log_shares[near]))))
+        nearest = self._nearest(found, numbers)
+        weighed = {centre: (self._timing(centre), _log_weight(said, centre)) for centre in (best, nearest)}
+        shown = {centre: each for centre, each in weighed.items() if self._shows(each[0], numbers)}
+        covers = nearest in shown and weighed[nearest][1] > _COVERS
+        return Told(sure, tuple(shown.values()), covers)
 
-    def _timing_without(self, position: int) -> tuple[Timing, float]:
+    def _weighed(self, position: int) -> _Said:
         scheme, starts = self.codebook.scheme, self._starts
         carried = scheme.first_position(self.channel) + np.arange(len(self._tones)) % self.channel.symbols
         apart = carried != position
@@ -58,10 +93,23 @@ class OtherPositions:
         tones = [own if told else usual for own, told in zip(self._tones, apart, strict=True)]
         question = Question(tones, starts.lags[promising], starts.inside[promising] & apart)
         (said,) = coherent_evidence(self._heard, [question], self.prepared.motion.step_s)
-        best = promising[np.argmax(said)]
-        near = np.abs(promising - best) <= _REACH
-        log_share = min(0.0, float(logsumexp(np.asarray(log_softmax(said))[near])))
-        return Timing(float(starts.onsets_s[best]), scheme.rate_hz), log_share
+        return _Said(starts.half_cells[promising], np.asarray(log_softmax(_TEMPER * said)))
+
+    def _timing(self, half_cells: int) -> Timing:
+        motion = self.prepared.motion
+        return Timing(motion.start_s + 0.5 * half_cells * motion.step_s, self.codebook.scheme.rate_hz)
+
+    def _nearest(self, found: Timing, numbers: NDArray[np.int64]) -> int:
+        """The start at the nominal rate at which the middle window begins when it does so at `found`."""
+        scheme, motion = self.codebook.scheme, self.prepared.motion
+        before = int(numbers[len(numbers) // 2]) * scheme.window_ticks(self.channel)
+        onset_s = found.onset_s + before / found.rate_hz - before / scheme.rate_hz
+        return round((onset_s - motion.start_s) / (0.5 * motion.step_s))
+
+    def _shows(self, timing: Timing, numbers: NDArray[np.int64]) -> bool:
+        """Whether just these windows are seen at that timing."""
+        shown = shown_numbers(self.codebook, self.channel, self.prepared.motion, timing, self.bounds)
+        return np.array_equal(shown, numbers)
 
     @cached_property
     def _tones(self) -> list[Tones]:
@@ -91,16 +139,23 @@ class OtherPositions:
         places = np.clip(np.rint(lags).astype(np.int64), 0, last)
         # A window is played or not at even odds.
         carried = np.logaddexp(0.0, np.take_along_axis(by_lag.T, places, axis=0)) - np.log(2.0)
-        return _Starts(motion.start_s + cells * motion.step_s, lags, inside, np.where(inside, carried, 0.0))
+        return _Starts(np.rint(2.0 * cells).astype(np.int64), lags, inside, np.where(inside, carried, 0.0))
+
+
+def _log_weight(said: _Said, centre: int) -> float:
+    """Log weight of a start: its own and its neighbours' probabilities, a part of each."""
+    away = np.abs(said.half_cells - centre)
+    parts = np.where(away == 0, _KEPT, np.where(away <= _SPREAD, (1.0 - _KEPT) / (2 * _SPREAD), 0.0))
+    return float(logsumexp(said.log_shares, b=parts))
 
 
 @dataclass(frozen=True)
 class _Starts:
-    """`onsets_s` (starts,); where each window begins, `lags` (starts, windows) in cells of what was heard, which are
-    `inside`, and the log `evidence` of each by itself.
+    """When the first window begins, `half_cells` (starts,) after the motion; where each window does, `lags` (starts,
+    windows) in cells of what was heard, which are `inside`, and the log `evidence` of each by itself.
     """
 
-    onsets_s: Floats
+    half_cells: NDArray[np.int64]
     lags: Floats
     inside: Bools
     evidence: Floats

@@ -17,6 +17,7 @@ from mtm_audit.significance.adaptation import adapted, seen_of
 from mtm_audit.significance.channel_terms import ChannelTerms, or_silent
 from mtm_audit.significance.likelihood import log_e_of
 from mtm_audit.significance.neighbourhood import at_phase_of
+from mtm_audit.significance.other_positions import Told
 from mtm_audit.significance.sequence import likeliest, weights_of
 from mtm_audit.significance.weighed_channel import TableOf, WeighedChannel, alike, anchor, log_prior, selected
 
@@ -24,9 +25,6 @@ Integers = NDArray[np.int64]
 
 # Of a symbol's weights so much come from the others, the rest from the prior.
 OTHERS = 0.9
-# Other positions are believed so much of the timing at the most.
-_BELIEVED = 0.9
-_LEAST_SHARE = 1e-300
 # How many candidates of a position are weighed exactly.
 _TRIED = 2
 
@@ -65,42 +63,45 @@ def _symbol_nats(own: Sequence[WeighedChannel], showing: Sequence[int], position
 
 
 def _told_by_others(own: Sequence[WeighedChannel], showing: Sequence[int], position: int, symbol: int) -> float | None:
-    """Log e-value under weights of others, at the timing that was found and at the one that they show by themselves."""
+    """Log e-value under weights of others, at the timing that was found and at those that they show by themselves."""
+    told = _told_timings(own, showing, position)
+    if told and all(each.covers for each in told.values()):
+        return _at_told(own, showing, told, position, symbol)
     found = [_by_others(own, row, showing, position, symbol, _timing(own, row, showing)) for row in showing]
     if any(value is None for value in found):
         return None
     total = float(sum(value for value in found if value is not None))
-    shown = _shown_timings(own, showing, position)
-    if shown is None:
+    if not told:
         return total
-    share = min(_BELIEVED, float(np.exp(sum(log_share for _, log_share in shown.values()))))
-    timings = [(shown[own[row].channel.name][0], 0.0) for row in showing]
-    apart = [_by_others(own, row, showing, position, symbol, each) for row, each in zip(showing, timings, strict=True)]
-    return float(
-        np.logaddexp(
-            sum(value for value in apart if value is not None) + np.log(max(share, _LEAST_SHARE)),
-            total + np.log1p(-share),
-        )
-    )
+    unsure = 1.0 - np.prod([each.sure for each in told.values()])
+    return float(np.logaddexp(_at_told(own, showing, told, position, symbol), total + np.log(unsure)))
 
 
-def _shown_timings(
-    own: Sequence[WeighedChannel], showing: Sequence[int], position: int
-) -> dict[str, tuple[Timing, float]] | None:
-    """By channel name the timing that its other positions show, and how sure they are of it; None where one cannot.
-
-    Which windows show the position must follow from them alone as well.
-    """
-    found: dict[str, tuple[Timing, float]] = {}
+def _told_timings(own: Sequence[WeighedChannel], showing: Sequence[int], position: int) -> dict[str, Told]:
+    """By name what each channel that shows the position is told of its timing; nothing where one cannot be."""
+    found: dict[str, Told] = {}
     for row in showing:
         channel = own[row].channel
         if _elsewhere(own, row, showing) or channel.others is None or len(channel.shown) == 1:
-            return None
+            return {}
         if channel.name not in found:
-            found[channel.name] = channel.others.timing_without(position)
-        if not channel.others.shows(found[channel.name][0], channel.span.numbers):
-            return None
+            found[channel.name] = channel.others.told(position, channel.timing, channel.span.numbers)
     return found
+
+
+def _at_told(
+    own: Sequence[WeighedChannel], showing: Sequence[int], told: dict[str, Told], position: int, symbol: int
+) -> float:
+    """Log e-value of the candidate in all channels, each at the timings that it was told, which its parts share."""
+    total = 0.0
+    for name, each in told.items():
+        rows = [row for row in showing if own[row].channel.name == name]
+        values = [-np.inf]
+        for timing, log_weight in each.timings:
+            parts = [_by_others(own, row, showing, position, symbol, (timing, 0.0)) for row in rows]
+            values.append(log_weight + sum(value for value in parts if value is not None))
+        total += float(logsumexp(values) + np.log(each.sure))
+    return total
 
 
 def _together(own: Sequence[WeighedChannel], showing: Sequence[int], position: int, symbol: int) -> float:

@@ -53,22 +53,39 @@ class Exchanged(Codebook):
         return super().tones(channel, number, symbols)
 
 
+FOUND = Timing(ONSET_S, ROLLING.rate_hz)
+NUMBERS = np.arange(6)
+
+
 @pytest.mark.parametrize("position", range(3))
 def test_a_position_s_own_waveforms_have_no_say(position):
-    others = terms(*([symbol] for symbol in SENT)).others
-    exchanged = terms(*([symbol] for symbol in SENT), codebook=Exchanged(position)).others
-    assert others.timing_without(position) == exchanged.timing_without(position)
-    of_another_key = terms(*([symbol] for symbol in SENT), codebook=Codebook(OTHER_SECRET, ROLLING)).others
-    assert others.timing_without(position) != of_another_key.timing_without(position)
+    told, exchanged, of_another_key = (
+        terms(*([symbol] for symbol in SENT), codebook=book).others.told(position, FOUND, NUMBERS)
+        for book in (None, Exchanged(position), Codebook(OTHER_SECRET, ROLLING))
+    )
+    assert told == exchanged
+    assert told != of_another_key
 
 
 @pytest.mark.parametrize("position", range(3))
 def test_other_positions_find_when_the_message_began(position):
-    timing, log_share = terms(*([symbol] for symbol in SENT)).others.timing_without(position)
+    told = terms(*([symbol] for symbol in SENT)).others.told(position, FOUND, NUMBERS)
+    timing, log_weight = told.timings[0]
     # A robot follows a little later than it is told.
     assert timing.rate_hz == ROLLING.rate_hz
     assert ONSET_S - 0.1 <= timing.onset_s <= ONSET_S + 0.3
-    assert log_share > np.log(0.9)
+    assert log_weight > np.log(0.4)
+    assert told.sure > 0.8
+
+
+@pytest.mark.parametrize("position", range(3))
+def test_weights_of_all_timings_add_up_to_one_at_most(position):
+    others = terms(*([symbol] for symbol in SENT)).others
+    step_s = 0.5 * sent().motion.step_s
+    starts_s = sent().motion.start_s + np.arange(-150, 151) * step_s
+    nearest = [others.told(position, Timing(start_s, ROLLING.rate_hz), NUMBERS).timings[-1] for start_s in starts_s]
+    weights = {timing: np.exp(log_weight) for timing, log_weight in nearest}
+    assert 0.9 < sum(weights.values()) <= 1.0 + 1e-9
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -83,11 +100,11 @@ def test_a_search_that_others_made_costs_a_symbol_nothing(seed):
 
 def test_windows_that_another_timing_shows_are_not_weighed():
     """Which windows show a position must not follow from a timing that its candidate had a say in."""
-    told = terms(*([symbol] for symbol in SENT))
-    timing, _ = told.others.timing_without(1)
-    assert told.others.shows(timing, told.span.numbers)
-    assert not told.others.shows(Timing(timing.onset_s - 4.0, timing.rate_hz), told.span.numbers)
-    assert not told.others.shows(timing, told.span.numbers[1:])
+    others = terms(*([symbol] for symbol in SENT)).others
+    assert others.told(1, FOUND, NUMBERS).covers
+    assert others.told(1, FOUND, NUMBERS[1:]).timings == ()
+    far = others.told(1, Timing(ONSET_S + 1.0, ROLLING.rate_hz), NUMBERS)
+    assert not far.covers
 
 
 @pytest.mark.parametrize("share", [0.2, 0.02])
