@@ -12,11 +12,12 @@ from mtm_audit.detectors.matched.correlate import Prepared
 from mtm_audit.detectors.matched.evidence import log_sum_exp
 from mtm_audit.detectors.matched.plants import Plants, joined, plant_family, returning, second_order
 from mtm_audit.detectors.matched.projections import Places, Projections, project, shaped
-from mtm_audit.model.timing import Onset, Timing
+from mtm_audit.model.timing import Onset, OnsetRange, Timing
 from mtm_audit.model.track import Floats
 from mtm_audit.significance.gains import Levels, all_levels, orientations
 from mtm_audit.significance.likelihood import Hypotheses, approximate_log_e, log_e, log_e_of, weights
 from mtm_audit.significance.neighbourhood import Span, neighbourhood
+from mtm_audit.significance.other_positions import OtherPositions
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel, Power
 
@@ -45,7 +46,8 @@ class ChannelTerms:
     `tones` (groups, k, injected axes, 2 K) theirs, without the spectrum's `powers` (K,): these count as part of the
     response, so that tones follow the law whose mean is known in closed form. `shared` when one codebook serves all
     positions (fixed schedule). `timing` is what all channels together found; `alone` and `strength` are what this one
-    found by itself. Channels of one `name` are parts of one, which carry the same symbols on different axes.
+    found by itself. Channels of one `name` are parts of one, which carry the same symbols on different axes. `others` is
+    there where other positions may say when a position's windows began.
     """
 
     name: str
@@ -64,6 +66,7 @@ class ChannelTerms:
     shared: bool
     strength: float
     alone: Timing
+    others: OtherPositions | None = None
     _terms: dict[Timing, "Terms"] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -231,7 +234,15 @@ def channel_terms(
         shared=shared,
         strength=found.strength if reading.alone_strength is None else reading.alone_strength,
         alone=found.timing if reading.alone is None else reading.alone,
+        others=None if apart else _others(codebook, channel, reading.prepared, onset),
     )
+
+
+def _others(codebook: Codebook, channel: Channel, prepared: Prepared, onset: Onset) -> OtherPositions | None:
+    """Where each window has its own waveform and the search for the start has to be paid."""
+    if codebook.scheme.schedule == "rolling" and isinstance(onset, OnsetRange) and channel.symbols > 1:
+        return OtherPositions(codebook, channel, prepared, onset)
+    return None
 
 
 def _terms_at(channel: ChannelTerms, timing: Timing) -> Terms:

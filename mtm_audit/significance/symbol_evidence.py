@@ -17,6 +17,7 @@ from mtm_audit.significance.adaptation import adapted, seen_of
 from mtm_audit.significance.channel_terms import ChannelTerms, or_silent
 from mtm_audit.significance.likelihood import log_e_of
 from mtm_audit.significance.neighbourhood import at_phase_of
+from mtm_audit.significance.other_positions import Told
 from mtm_audit.significance.sequence import likeliest, weights_of
 from mtm_audit.significance.weighed_channel import TableOf, WeighedChannel, alike, anchor, log_prior, selected
 
@@ -55,11 +56,52 @@ def _symbol_nats(own: Sequence[WeighedChannel], showing: Sequence[int], position
     by_prior = sum(_by_prior(own[row], position, symbol) for row in showing)
     if len(showing) > 1:
         by_prior = float(np.logaddexp(by_prior, _together(own, showing, position, symbol)) - np.log(2.0))
-    others = [_by_others(own, row, showing, position, symbol) for row in showing]
-    if any(value is None for value in others):
+    by_others = _told_by_others(own, showing, position, symbol)
+    if by_others is None:
         return by_prior
-    by_others = sum(value for value in others if value is not None)
     return float(np.logaddexp(by_others + np.log(OTHERS), by_prior + np.log(1.0 - OTHERS)))
+
+
+def _told_by_others(own: Sequence[WeighedChannel], showing: Sequence[int], position: int, symbol: int) -> float | None:
+    """Log e-value under weights of others, at the timing that was found and at those that they show by themselves."""
+    told = _told_timings(own, showing, position)
+    if told and all(each.covers for each in told.values()):
+        return _at_told(own, showing, told, position, symbol)
+    found = [_by_others(own, row, showing, position, symbol, _timing(own, row, showing)) for row in showing]
+    if any(value is None for value in found):
+        return None
+    total = float(sum(value for value in found if value is not None))
+    if not told:
+        return total
+    unsure = 1.0 - np.prod([each.sure for each in told.values()])
+    return float(np.logaddexp(_at_told(own, showing, told, position, symbol), total + np.log(unsure)))
+
+
+def _told_timings(own: Sequence[WeighedChannel], showing: Sequence[int], position: int) -> dict[str, Told]:
+    """By name what each channel that shows the position is told of its timing; nothing where one cannot be."""
+    found: dict[str, Told] = {}
+    for row in showing:
+        channel = own[row].channel
+        if _elsewhere(own, row, showing) or channel.others is None or len(channel.shown) == 1:
+            return {}
+        if channel.name not in found:
+            found[channel.name] = channel.others.told(position, channel.timing, channel.span.numbers)
+    return found
+
+
+def _at_told(
+    own: Sequence[WeighedChannel], showing: Sequence[int], told: dict[str, Told], position: int, symbol: int
+) -> float:
+    """Log e-value of the candidate in all channels, each at the timings that it was told, which its parts share."""
+    total = 0.0
+    for name, each in told.items():
+        rows = [row for row in showing if own[row].channel.name == name]
+        values = [-np.inf]
+        for timing, log_weight in each.timings:
+            parts = [_by_others(own, row, showing, position, symbol, (timing, 0.0)) for row in rows]
+            values.append(log_weight + sum(value for value in parts if value is not None))
+        total += float(logsumexp(values) + np.log(each.sure))
+    return total
 
 
 def _together(own: Sequence[WeighedChannel], showing: Sequence[int], position: int, symbol: int) -> float:
@@ -99,18 +141,31 @@ def _by_prior(item: WeighedChannel, position: int, symbol: int) -> float:
     return float(logsumexp(exact + item.chosen[1]))
 
 
+def _elsewhere(own: Sequence[WeighedChannel], row: int, showing: Sequence[int]) -> list[WeighedChannel]:
+    """The channels without the position that may share a hypothesis with this one."""
+    others = [other for number, other in enumerate(own) if number not in showing]
+    return [other for other in others if alike([own[row].channel, other.channel])]
+
+
 def _by_others(
-    own: Sequence[WeighedChannel], row: int, showing: Sequence[int], position: int, symbol: int
+    own: Sequence[WeighedChannel],
+    row: int,
+    showing: Sequence[int],
+    position: int,
+    symbol: int,
+    at: tuple[Timing, float],
 ) -> float | None:
-    """Under weights that channels and positions without this candidate's waveform give; None when there are none."""
+    """Under weights that channels and positions without this candidate's waveform give; None when there are none.
+
+    `at` is the timing to weigh at, and the log prior that it costs.
+    """
     channel = own[row].channel
     place = _column(channel, position, symbol)
-    others = [other for number, other in enumerate(own) if number not in showing]
-    elsewhere = [other for other in others if alike([channel, other.channel])]
+    elsewhere = _elsewhere(own, row, showing)
     mine = len(channel.shown) > 1
     if place is None or not (elsewhere or mine):
         return None
-    timing, paid = _timing(own, row, showing, elsewhere)
+    timing, paid = at
     terms = channel.at(timing)
 
     def said(table_of: TableOf) -> Floats:
@@ -136,15 +191,14 @@ def _by_others(
     return float(logsumexp(exact + shares) + paid)
 
 
-def _timing(
-    own: Sequence[WeighedChannel], row: int, showing: Sequence[int], elsewhere: Sequence[WeighedChannel]
-) -> tuple[Timing, float]:
+def _timing(own: Sequence[WeighedChannel], row: int, showing: Sequence[int]) -> tuple[Timing, float]:
     """The timing to weigh at, and the log prior that it costs.
 
     What other channels found costs nothing. A timing that this channel found itself is a choice that the candidate had
     a part in; the parts of a channel share it and pay once.
     """
     channel = own[row].channel
+    elsewhere = _elsewhere(own, row, showing)
     if elsewhere:
         return anchor([other.channel for other in elsewhere], channel), 0.0
     first = next(number for number in showing if own[number].channel.name == channel.name)

@@ -16,7 +16,7 @@ from mtm_audit.detectors.matched.noise import principal_axes
 from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_audit.detectors.matched.refine import refined_timing
 from mtm_audit.detectors.matched.search import SEARCHED_RATES, search_timings
-from mtm_audit.detectors.matched.windows import LEAST_PART, Window, make_windows
+from mtm_audit.detectors.matched.windows import LEAST_PART, Window, make_windows, shown_numbers
 from mtm_audit.model.glimpse import Glimpse
 from mtm_audit.model.timing import Onset, Timing
 from mtm_audit.model.track import Floats
@@ -114,7 +114,7 @@ class MatchedDetector:
         own = [channels[number] for number in numbers]
         noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
         timings = [searched[number][0].timing for number in numbers]
-        shown = [_numbers(codebook, *each, onset) for each in zip(own, moved, timings, strict=True)]
+        shown = [shown_numbers(codebook, *each, onset) for each in zip(own, moved, timings, strict=True)]
         windows = _all_windows(codebook, own, moved, timings, shown)
         found = estimate(windows, moved, noise, self._profile)
         better = refined_timing(found, windows, moved, timings)
@@ -220,17 +220,6 @@ def _all_windows(
     return windows
 
 
-def _numbers(codebook: Codebook, channel: Channel, motion: Motion, timing: Timing, onset: Onset) -> range:
-    """Which windows from the onset on the motion shows enough of; under a fixed schedule earlier ones repeat it."""
-    length_s = codebook.scheme.window_ticks(channel) / timing.rate_hz
-    end_s = motion.start_s + len(motion.seen) * motion.step_s
-    first = int(np.ceil((motion.start_s - timing.onset_s) / length_s - (1.0 - LEAST_PART)))
-    last = int(np.floor((end_s - timing.onset_s) / length_s - LEAST_PART))
-    if onset is not None or codebook.scheme.schedule == "rolling":
-        first = max(0, first)
-    return range(first, last + 1)
-
-
 def _holds_no_part(codebook: Codebook, channel: Channel, motion: Motion) -> bool:
     """Whether the whole motion is too short for a part of a window, however fast its clock runs."""
     fastest_hz = codebook.scheme.rate_hz * (1.0 + SEARCHED_RATES)
@@ -241,7 +230,7 @@ def _too_short(
     codebook: Codebook, channel: Channel, prepared: Prepared, timing: Timing, onset: Onset
 ) -> MtmError | None:
     """Why no window of the channel can be read from the motion; None when one can."""
-    if len(_numbers(codebook, channel, prepared.motion, timing, onset)):
+    if len(shown_numbers(codebook, channel, prepared.motion, timing, onset)):
         return None
     return _less_than_a_part(codebook, channel, timing.rate_hz)
 

@@ -10,7 +10,7 @@ from mtm_audit.detectors.matched.candidates import WindowTones
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import NoiseModel, whitened
 from mtm_audit.detectors.matched.plants import TAIL_S, Plants, tone_responses
-from mtm_audit.model.timing import Timing
+from mtm_audit.model.timing import Onset, Timing
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel
@@ -50,6 +50,17 @@ class Statistics:
 
     information: Floats
     precision: Floats
+
+
+def shown_numbers(codebook: Codebook, channel: Channel, motion: Motion, timing: Timing, onset: Onset) -> range:
+    """Which windows from the onset on the motion shows enough of; under a fixed schedule earlier ones repeat it."""
+    length_s = codebook.scheme.window_ticks(channel) / timing.rate_hz
+    end_s = motion.start_s + len(motion.seen) * motion.step_s
+    first = int(np.ceil((motion.start_s - timing.onset_s) / length_s - (1.0 - LEAST_PART)))
+    last = int(np.floor((end_s - timing.onset_s) / length_s - LEAST_PART))
+    if onset is not None or codebook.scheme.schedule == "rolling":
+        first = max(0, first)
+    return range(first, last + 1)
 
 
 def make_windows(
