@@ -46,8 +46,8 @@ class ChannelTerms:
     `tones` (groups, k, injected axes, 2 K) theirs, without the spectrum's `powers` (K,): these count as part of the
     response, so that tones follow the law whose mean is known in closed form. `shared` when one codebook serves all
     positions (fixed schedule). `timing` is what all channels together found; `alone` and `strength` are what this one
-    found by itself. Channels of one `name` are parts of one, which carry the same symbols on different axes. `others` is
-    there where other positions may say when a position's windows began.
+    found by itself. Channels of one `name` are parts of one, which carry the same symbols on different axes. `others`
+    is there where other positions may say when a position's windows began.
     """
 
     name: str

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_softmax, logsumexp
 
+from mtm_audit.detectors.matched.candidates import Tones, stacked_tones
 from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
-from mtm_audit.detectors.matched.correlate import Heard, Prepared, Tones, evidence_by_lag, hear, stacked_tones
+from mtm_audit.detectors.matched.correlate import Heard, Prepared, evidence_by_lag, hear
 from mtm_audit.detectors.matched.search import lead_cells, waveform_sets
 from mtm_audit.detectors.matched.windows import shown_numbers
 from mtm_audit.model.timing import OnsetRange, Timing
