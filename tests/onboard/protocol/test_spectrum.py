@@ -106,6 +106,12 @@ def test_power_is_one_on_average_and_each_tone_has_its_share(power):
     assert squares.mean() == pytest.approx(1.0, abs=4.5 * squares.std() / 64.0)
 
 
+def test_without_a_spectrum_all_tones_are_alike_loud():
+    tones_hz, powers = channel_tones(small_scheme(), small_scheme().channels[0])
+    assert tones_hz == pytest.approx(tone_bins(120, 50.0, (2.0, 20.0)) / 2.4)
+    assert powers.tolist() == [1.0] * len(tones_hz)
+
+
 def test_window_power_spreads_less_than_the_ensemble_s():
     spreads = []
     for power in ("window", "ensemble"):
