@@ -51,7 +51,7 @@ def check_points(points: object) -> None:
     for value in (number for point in points for number in point):
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise MtmError(f"the spectrum holds {value!r}; give numbers alone, Hz and dB of each point")
-    frequencies_hz, levels_db = zip(*points, strict=True)
+    frequencies_hz, levels_db = [hz for hz, _ in points], [level_db for _, level_db in points]
     if any(later <= earlier for earlier, later in pairwise(frequencies_hz)):
         raise MtmError("the spectrum's frequencies do not rise from point to point; put the lowest first, each once")
     if frequencies_hz[0] < 0.0 or frequencies_hz[-1] > _MAX_HZ:

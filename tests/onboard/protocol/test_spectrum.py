@@ -51,11 +51,17 @@ def test_powers_are_positive_and_of_mean_one(points, count):
     assert powers.min() > 0.0
 
 
-@given(POINTS, st.floats(-20.0, 20.0))
+@given(POINTS, st.floats(-4000.0, 4000.0))
 def test_only_differences_of_levels_count(points, offset_db):
     moved = tuple((hz, db + offset_db) for hz, db in points)
     tones_hz = np.linspace(0.5, 24.0, 17)
-    assert tone_powers(moved, tones_hz) == pytest.approx(tone_powers(points, tones_hz), rel=1e-9)
+    assert tone_powers(moved, tones_hz) == pytest.approx(tone_powers(points, tones_hz), rel=1e-6)
+
+
+def test_the_most_that_a_spectrum_may_hold_is_taken():
+    many = tuple((float(hz), 0.0) for hz in range(MAX_POINTS))
+    for points in (many, ((0.0, 0.0), (1e6, 0.0)), ((1.0, 0.0), (2.0, -MAX_RANGE_DB))):
+        assert small_scheme(spectrum=points).spectrum == points
 
 
 def test_levels_follow_the_line_and_stay_beyond_the_points():
@@ -98,6 +104,12 @@ def test_power_is_one_on_average_and_each_tone_has_its_share(power):
     assert means / book.tone_powers(channel) == pytest.approx(np.ones(len(means)), abs=4.5 / 64.0)
     squares = np.mean(book.samples(channel, 0)[:, 0] ** 2, axis=1)
     assert squares.mean() == pytest.approx(1.0, abs=4.5 * squares.std() / 64.0)
+
+
+def test_without_a_spectrum_all_tones_are_alike_loud():
+    tones_hz, powers = channel_tones(small_scheme(), small_scheme().channels[0])
+    assert tones_hz == pytest.approx(tone_bins(120, 50.0, (2.0, 20.0)) / 2.4)
+    assert powers.tolist() == [1.0] * len(tones_hz)
 
 
 def test_window_power_spreads_less_than_the_ensemble_s():
@@ -151,6 +163,7 @@ def test_a_scheme_file_keeps_the_spectrum(tmp_path):
         (((2.0, 0.0), (1.0, -3.0)), "do not rise"),
         (((-1.0, 0.0), (1.0, -3.0)), "between 0 and"),
         (((1.0, 0.0), (2e6, -3.0)), "between 0 and"),
+        (((1.0, 0.0), (2.0, 0.0), (2e6, -3.0)), "between 0 and"),
         (((1.0, 0.0), (2.0, -MAX_RANGE_DB - 0.5)), "span 60.5 dB; 60 dB at most"),
         (((1.0, 0.0), (2.0, float("nan"))), "holds nan"),
         (((1.0, 0.0), (float("inf"), 0.0)), "holds inf"),

@@ -3,7 +3,7 @@ import pytest
 
 from hil.experiments.identify.fit import fit_interference, fit_response, phase_delay_s
 from hil.experiments.identify.logs import CommandLog, LoggedRun, logged_run
-from hil.experiments.identify.profile import profile_of
+from hil.experiments.identify.profile import axis_response, profile_of
 from hil.experiments.identify.spectra import RATE_HZ, cross_spectra
 from hil.plants.linear_response import LinearResponse
 from hil.plants.robots import STEP_S
@@ -31,6 +31,17 @@ def test_response_and_interference_of_a_known_robot_are_found(run, axis, known):
     assert noise.deviation == pytest.approx(known.deviation, rel=0.2)
     assert noise.correlation_s == pytest.approx(known.correlation_s, rel=0.4)
     assert noise.tracking < 0.003
+
+
+def test_a_profile_s_axis_has_the_gain_and_all_of_the_motion(run):
+    spectra = cross_spectra([run], 0)
+    axis = axis_response("vx", [AHEAD.response, AHEAD.response], [spectra, spectra])
+    hz = np.array([0.3, 0.7, 1.5, 3.0])
+    gains, densities = axis.at(hz)
+    assert axis.name == "vx"
+    assert gains == pytest.approx(np.abs(AHEAD.response.at(hz)), rel=0.05)
+    near = np.array([spectra.power_out[np.abs(spectra.frequencies_hz / own - 1.0) < 0.2].mean() for own in hz])
+    assert densities == pytest.approx(near / np.sinc(hz / RATE_HZ) ** 2, rel=0.3)
 
 
 def test_coherence_tells_what_the_command_explains(run):
