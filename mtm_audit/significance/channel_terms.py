@@ -16,7 +16,7 @@ from mtm_audit.model.timing import Onset, OnsetRange, Timing
 from mtm_audit.model.track import Floats
 from mtm_audit.significance.gains import Levels, all_levels, orientations
 from mtm_audit.significance.likelihood import Hypotheses, approximate_log_e, log_e, log_e_of, weights
-from mtm_audit.significance.neighbourhood import Span, neighbourhood
+from mtm_audit.significance.neighbourhood import Neighbourhood, Span, neighbourhood
 from mtm_audit.significance.other_positions import OtherPositions
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel, Power
@@ -67,7 +67,7 @@ class ChannelTerms:
     strength: float
     alone: Timing
     others: OtherPositions | None = None
-    _terms: dict[Timing, "Terms"] = field(default_factory=dict, repr=False, compare=False)
+    _terms: dict[bytes, "Terms"] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def shown(self) -> list[int]:
@@ -80,10 +80,14 @@ class ChannelTerms:
         return orientations(len(self.prepared.filtered), self.tones.shape[2])
 
     def at(self, timing: Timing) -> "Terms":
-        """The tables around a timing; kept, since several mixtures ask for the same."""
-        if timing not in self._terms:
-            self._terms[timing] = _terms_at(self, timing)
-        return self._terms[timing]
+        """The tables around a timing; kept, since several mixtures ask for the same, and timings that differ by less
+        than the grid have one neighbourhood.
+        """
+        near = neighbourhood(self.span, timing, self.onset)
+        place = near.starts_s.tobytes()
+        if place not in self._terms:
+            self._terms[place] = _terms_at(self, timing, near)
+        return self._terms[place]
 
     def by_position(self, table: Floats) -> Floats:
         """Add up the groups of each shown position: (..., groups, k) to (..., shown positions, k)."""
@@ -245,8 +249,7 @@ def _others(codebook: Codebook, channel: Channel, prepared: Prepared, onset: Ons
     return None
 
 
-def _terms_at(channel: ChannelTerms, timing: Timing) -> Terms:
-    near = neighbourhood(channel.span, timing, channel.onset)
+def _terms_at(channel: ChannelTerms, timing: Timing, near: Neighbourhood) -> Terms:
     length_s = channel.span.window_ticks / timing.rate_hz
     places = Places(near.starts_s, channel.groups, SHAPES, length_s, channel.tones_hz)
     projections = shaped(project(channel.prepared, places), channel.powers)
