@@ -7,8 +7,10 @@ overheard. Rollouts of one measurement share the key and what was learnt of it.
 
 As a hardening of the fixed schedule, a slot may give the symbols another order, which the key says: symbol i is then
 played as the waveform of number order[i]. This eavesdropper tells waveforms apart by their likeness instead, and takes
-the order of the first slot that was overheard. What is forged is counted twice: when it reads as it was meant, and when
-it reads as any waveform that was learnt, which is what shows that a message of the key is there.
+the order of the first slot that was overheard.
+What is forged is counted twice: when it reads as it was meant, and when it reads as any waveform that was learnt, which
+is what shows that a message of the key is there. One order holds for all that is forged in one measurement, so that a
+point's rate of the former kind swings with it.
 """
 
 from collections.abc import Mapping
