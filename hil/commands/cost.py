@@ -8,7 +8,8 @@ from rich.table import Table
 
 from hil.experiments.runs.cells import CellStore
 from hil.experiments.runs.result_file import write_result_csv
-from hil.experiments.task.cost import COLUMNS, measure_costs, rows_of
+from hil.experiments.task.cost import COLUMNS, Cost, measure_costs, rows_of
+from hil.experiments.task.drive import CONDITIONS
 from mtm_onboard.protocol import MtmError, load_key
 
 
@@ -28,12 +29,19 @@ def cost(
         raise MtmError("two of the keys have one name; make them with different --id")
     with CellStore(cells) as store:
         costs = measure_costs(schemes, drives, seed, store, console, workers)
-    table = Table(*COLUMNS, title=f"The RoboMaster's task under the noise of keys, {drives} drives", box=None)
-    for row in rows_of(costs):
-        table.add_row(*map(str, row))
-    console.print(table)
+    for name in schemes:
+        console.print(_table(name, [cost for cost in costs if cost.scheme == name]))
     if out is not None:
         command = f"mtm-hil cost {' '.join(map(str, keys))} -n {drives} --seed {seed} --out {out}"
         notes = tuple(f"{name}: scheme {scheme.fingerprint}" for name, scheme in schemes.items())
         write_result_csv(out, command, COLUMNS, rows_of(costs), notes)
         print(f"wrote {out}")
+
+
+def _table(name: str, costs: Sequence[Cost]) -> Table:
+    title = f"The RoboMaster's task under the noise of {name}, {costs[0].drives} drives"
+    table = Table("", *CONDITIONS, "keyed - white (95 %)", title=title, box=None)
+    for cost in costs:
+        means = [f"{cost.means[condition]:.4g}" for condition in CONDITIONS]
+        table.add_row(cost.measure, *means, f"{cost.more:.2g} ({cost.low:.2g} to {cost.high:.2g})")
+    return table

@@ -1,7 +1,7 @@
 """One drive of the RoboMaster's task from its start to its target, under noise or none, and what it took."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,8 +44,8 @@ class Drive:
 def drive(scheme: Scheme, condition: str, seed: int) -> Drive:
     """The first robot of the paper's task drives its route of that seed, its slip the same under each condition.
 
-    White noise has the standard deviations of the scheme's first channel on that channel's axes; keyed noise is what
-    the robot's modulator adds under a key of the seed's own. Raises MtmError when a joint is among the channel's axes.
+    White noise has the standard deviations of the channels of the scheme's first body on their axes; keyed noise is
+    what the robot's modulators add under a key of the seed's own. Raises MtmError when a joint is among these axes.
     """
     rate_hz, route = scheme.rate_hz, routes(seeds_of(seed).permutation())[0]
     plant = MecanumPlant(calibrated_parameters(), seed, route.start_xy_m)
@@ -82,30 +82,36 @@ def distances_m(places_xy_m: Floats, corners_xy_m: Floats) -> Floats:
 
 
 def _noise_of(scheme: Scheme, condition: str, seed: int) -> Add:
-    channel = scheme.channels[0]
+    channels = [channel for channel in scheme.channels if channel.body == scheme.channels[0].body]
     if condition == KEYED:
-        secrets = np.random.default_rng([_KEYS_STREAM, seed])
-        codebook = Codebook(secrets.bytes(32), scheme)
-        symbols = secrets.integers(scheme.alphabet_size, size=channel.symbols).tolist()
-        modulator = Modulator(codebook, channel.name, symbols)
-        modulator.require_body_axes()
-
-        def play(tick: int, base: BodyVelocity) -> BodyVelocity:
-            noisy = modulator.add(tick, base)
-            modulator.prepare(tick)
-            return noisy
-
-        return play
+        return _keyed(scheme, channels, np.random.default_rng([_KEYS_STREAM, seed]))
     if condition == WHITE:
-        return _white(channel, np.random.default_rng([_NOISE_STREAM, seed]))
+        return _white(channels, np.random.default_rng([_NOISE_STREAM, seed]))
     return lambda _, base: base
 
 
-def _white(channel: Channel, draw: np.random.Generator) -> Add:
-    sigmas = np.zeros(len(AXES))
-    for axis, sigma in zip(channel.axes, channel.sigmas, strict=True):
-        sigmas[AXES.index(axis)] = sigma
-    return lambda _, base: BodyVelocity(*(base + sigmas * draw.standard_normal(len(AXES))))
+def _keyed(scheme: Scheme, channels: Sequence[Channel], draw: np.random.Generator) -> Add:
+    codebook = Codebook(draw.bytes(32), scheme)
+    symbols = [draw.integers(scheme.alphabet_size, size=channel.symbols).tolist() for channel in channels]
+    modulators = [Modulator(codebook, *each) for each in zip([own.name for own in channels], symbols, strict=True)]
+    for modulator in modulators:
+        modulator.require_body_axes()
+
+    def play(tick: int, base: BodyVelocity) -> BodyVelocity:
+        for modulator in modulators:
+            base = modulator.add(tick, base)
+            modulator.prepare(tick)
+        return base
+
+    return play
+
+
+def _white(channels: Sequence[Channel], draw: np.random.Generator) -> Add:
+    variances = np.zeros(len(AXES))
+    for channel in channels:
+        for axis, sigma in zip(channel.axes, channel.sigmas, strict=True):
+            variances[AXES.index(axis)] += sigma**2
+    return lambda _, base: BodyVelocity(*(base + np.sqrt(variances) * draw.standard_normal(len(AXES))))
 
 
 def _root_mean_square(values: Floats) -> float:

@@ -43,6 +43,13 @@ def test_a_drive_is_the_same_for_the_same_seed(drives):
     assert drive(SCHEME, KEYED, 6) != drives[KEYED]
 
 
+def test_all_channels_of_a_body_are_driven_with():
+    turning = replace(SCHEME, channels=(*SCHEME.channels, Channel("turn", "robot0", ("wz",), 1, 0.5)))
+    for condition in (WHITE, KEYED):
+        plain, turned = (drive(scheme, condition, 5).heading_error_deg for scheme in (SCHEME, turning))
+        assert turned > plain + 0.2
+
+
 def test_a_joint_s_noise_drives_no_robot():
     scheme = replace(SCHEME, channels=(Channel("arm", "arm", ("joint1",), 1, 0.1),))
     with pytest.raises(MtmError, match="can be added to a body velocity"):
