@@ -16,7 +16,7 @@ from mtm_audit.model.timing import Onset, OnsetRange, Timing
 from mtm_audit.model.track import Floats
 from mtm_audit.significance.gains import Levels, all_levels, orientations
 from mtm_audit.significance.likelihood import Hypotheses, approximate_log_e, log_e, log_e_of, weights
-from mtm_audit.significance.neighbourhood import Neighbourhood, Span, neighbourhood
+from mtm_audit.significance.neighbourhood import Neighbourhood, Span, centred, neighbourhood
 from mtm_audit.significance.other_positions import OtherPositions
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel, Power
@@ -89,6 +89,10 @@ class ChannelTerms:
             self._terms[place] = _terms_at(self, timing, near)
         return self._terms[place]
 
+    def centred(self) -> tuple[Timing, float]:
+        """The timing that was found, moved to one at which a term may be weighed, and the log weight that it costs."""
+        return centred(self.span, self.timing, self.onset)
+
     def by_position(self, table: Floats) -> Floats:
         """Add up the groups of each shown position: (..., groups, k) to (..., shown positions, k)."""
         if len(self.shown) == len(self.positions) and np.array_equal(self.positions, self.shown):
@@ -126,11 +130,6 @@ class Terms:
     log_priors: Floats
     coarse: Floats
     _fine: dict[int, Floats] = field(default_factory=dict, repr=False, compare=False)
-
-    @property
-    def log_prior(self) -> float:
-        """Log prior probability of the neighbourhood."""
-        return float(logsumexp(self.log_priors))
 
     def fine(self, pairs: Integers) -> Floats:
         """Approximate log e-values of some pairs: (pairs, levels, orientations, groups, k)."""

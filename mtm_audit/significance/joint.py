@@ -167,22 +167,24 @@ def _under_prior(witness: Witness, count: int) -> _Weighted:
 def _under_others(witness: Witness, count: int, position: int, symbol: int) -> tuple[_Weighted, _Weighted]:
     """The hypotheses of which the other positions say most, as they stand and with what those show of each tone.
 
-    The candidate's own waveform has no part in the choice but for the timing, whose prior is paid.
+    The candidate's own waveform has no part in the choice but for the timing, whose weight is paid.
     """
     item = witness.item
-    channel, terms = item.channel, item.terms
+    channel = item.channel
     groups = witness.groups_at(position)
     if not len(groups) or len(channel.shown) == 1:
         plain = _under_prior(witness, count)
         return plain, plain
     row = witness.row_of(int(groups[0]))
+    timing, log_weight = channel.centred()
+    terms = channel.at(timing)
 
     def said(table_of: TableOf) -> Floats:
         values = channel.mixed(table_of(terms), symbol if channel.shared else None)
         return np.asarray(np.delete(values, row, axis=-1).sum(axis=-1))
 
     pairs, places, log_weights = selected(terms, terms.log_priors, said)
-    shares = np.asarray(log_softmax(log_weights)) + terms.log_prior
+    shares = np.asarray(log_softmax(log_weights)) + log_weight
     kept = largest(shares, count)
     chosen = terms.hypotheses(pairs, places[kept])
     linear, quadratic = weights_of(terms, chosen)

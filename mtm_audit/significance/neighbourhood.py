@@ -14,6 +14,9 @@ _EARLIEST_S, _LATEST_S = -0.04, 0.42
 _SHIFTS = np.arange(-4, 5)
 _RATE_STEPS = np.arange(-2, 3)
 RATES = len(_RATE_STEPS)
+# Of the grid's timings one in so many onsets and rates is a centre; neighbourhoods of all centres overlap as little as
+# lets each hold what lies half way to the next, and a plant's spread.
+_CENTRE_SHIFTS, _CENTRE_RATES = 5, 3
 # Clocks that are off by more are possible but rare: the scale of a Cauchy prior over relative rates.
 _USUAL_RATE_ERROR = 0.003
 
@@ -46,33 +49,64 @@ class Neighbourhood:
     starts_s: Floats
     log_priors: Floats
 
-    @property
-    def log_prior(self) -> float:
-        """Log prior probability of the whole neighbourhood."""
-        return float(np.logaddexp.reduce(self.log_priors))
+
+def centred(span: Span, timing: Timing, onset: Onset) -> tuple[Timing, float]:
+    """The nearest of the grid's centres, and its log weight; the weights of all centres have a sum of 1 at the most.
+
+    So a term that is weighed around a centre may be chosen for what it says, once it has been multiplied by the weight.
+    """
+    grid = _grid(span, timing, onset)
+    rate = round(grid.rate / _CENTRE_RATES) * _CENTRE_RATES
+    block = (rate + np.arange(_CENTRE_RATES) - _CENTRE_RATES // 2) * grid.spacing
+    weight = float(np.logaddexp.reduce(_log_rate_priors(block, grid.spacing)))
+    rate_hz = span.nominal_hz * (1.0 + rate * grid.spacing)
+    if isinstance(onset, int | float):
+        return Timing(timing.onset_s, rate_hz), weight
+    shift = round(grid.shift / _CENTRE_SHIFTS) * _CENTRE_SHIFTS
+    onset_s = span.origin_s + shift * grid.half_s - grid.pivot * span.window_ticks / rate_hz
+    # The first and the last centre stand for onsets beyond the range as well.
+    count = _onsets(span, onset, grid.half_s) + _CENTRE_SHIFTS - 1
+    return Timing(onset_s, rate_hz), weight + math.log(_CENTRE_SHIFTS / count)
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Where a timing lies: `rate` in steps of `spacing` beside the nominal one; the window `pivot`, which changes of
+    the rate leave in place, begins `shift` half cells of `half_s` after the recording.
+    """
+
+    half_s: float
+    spacing: float
+    rate: int
+    pivot: int
+    shift: int
+
+
+def _grid(span: Span, timing: Timing, onset: Onset) -> _Grid:
+    """A known onset is the pivot, else it is the middle window."""
+    half_s = 0.5 * span.step_s
+    known = isinstance(onset, int | float)
+    pivot = 0 if known else int(span.numbers[len(span.numbers) // 2])
+    spacing = half_s / (span.lasts_s if known else 0.5 * span.lasts_s)
+    found_s = timing.onset_s + pivot * span.window_ticks / timing.rate_hz
+    rate = round((timing.rate_hz / span.nominal_hz - 1.0) / spacing)
+    return _Grid(half_s, spacing, rate, pivot, round((found_s - span.origin_s) / half_s))
 
 
 def neighbourhood(span: Span, timing: Timing, onset: Onset) -> Neighbourhood:
-    """The grid's timings around `timing`: onsets in half cells, rates that move a recording's end by as much.
-
-    A known onset is the pivot that changes of the rate leave in place, else it is the middle window.
-    """
-    half_s = 0.5 * span.step_s
-    known_s = float(onset) if isinstance(onset, int | float) else None
-    pivot = 0 if known_s is not None else int(span.numbers[len(span.numbers) // 2])
-    spacing = half_s / (span.lasts_s if known_s is not None else 0.5 * span.lasts_s)
-    nearest = round((timing.rate_hz / span.nominal_hz - 1.0) / spacing)
-    relative = (nearest + _RATE_STEPS) * spacing
-    if known_s is not None:
+    """The grid's timings around `timing`: onsets in half cells, rates that move a recording's end by as much."""
+    grid = _grid(span, timing, onset)
+    half_s, pivot = grid.half_s, grid.pivot
+    relative = (grid.rate + _RATE_STEPS) * grid.spacing
+    if isinstance(onset, int | float):
         shifts_s = np.arange(math.floor(_EARLIEST_S / half_s), math.ceil(_LATEST_S / half_s) + 1) * half_s
-        pivot_s, count = known_s, len(shifts_s)
+        pivot_s, count = float(onset), len(shifts_s)
     else:
-        found_s = timing.onset_s + pivot * span.window_ticks / timing.rate_hz
-        pivot_s = span.origin_s + round((found_s - span.origin_s) / half_s) * half_s
+        pivot_s = span.origin_s + grid.shift * half_s
         shifts_s, count = _SHIFTS * half_s, _onsets(span, onset, half_s)
     lengths_s = span.window_ticks / (span.nominal_hz * (1.0 + relative))
     starts_s = pivot_s + shifts_s[:, None, None] + (span.numbers - pivot) * lengths_s[:, None]
-    rates = _log_rate_priors(relative, spacing)
+    rates = _log_rate_priors(relative, grid.spacing)
     priors = np.broadcast_to(rates - np.log(count), (len(shifts_s), len(relative)))
     return Neighbourhood(starts_s.reshape(-1, len(span.numbers)), priors.ravel())
 

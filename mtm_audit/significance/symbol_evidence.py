@@ -192,7 +192,7 @@ def _by_others(
 
 
 def _timing(own: Sequence[WeighedChannel], row: int, showing: Sequence[int]) -> tuple[Timing, float]:
-    """The timing to weigh at, and the log prior that it costs.
+    """The timing to weigh at, and the log weight that it costs.
 
     What other channels found costs nothing. A timing that this channel found itself is a choice that the candidate had
     a part in; the parts of a channel share it and pay once.
@@ -202,8 +202,8 @@ def _timing(own: Sequence[WeighedChannel], row: int, showing: Sequence[int]) -> 
     if elsewhere:
         return anchor([other.channel for other in elsewhere], channel), 0.0
     first = next(number for number in showing if own[number].channel.name == channel.name)
-    timing = own[first].channel.timing
-    return timing, channel.at(timing).log_prior if first == row else 0.0
+    timing, log_weight = own[first].channel.centred()
+    return timing, log_weight if first == row else 0.0
 
 
 def _learned(channel: ChannelTerms, linear: Floats, quadratic: Floats, table: Floats, place: tuple[int, int]) -> Floats:

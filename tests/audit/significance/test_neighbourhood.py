@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mtm_audit.model.timing import OnsetRange, Timing
-from mtm_audit.significance.neighbourhood import Span, at_phase_of, neighbourhood
+from mtm_audit.significance.neighbourhood import Span, at_phase_of, centred, neighbourhood
 
 RATE_HZ = 50.0
 STEP_S = 0.04
@@ -88,7 +88,7 @@ def test_a_neighbourhood_holds_its_timing_and_part_of_the_grid(onset_s, rate, ti
     near = neighbourhood(span, timing, onset)
     assert near.starts_s.shape == (len(near.log_priors), len(span.numbers))
     assert np.all(np.isfinite(near.log_priors))
-    assert near.log_prior <= 0.0
+    assert np.logaddexp.reduce(near.log_priors) <= 0.0
     starts_s = timing.onset_s + span.numbers * ticks / timing.rate_hz
     # Within half a step of the grid at the pivot, and another at the recording's ends.
     if known != "known" or abs(span.numbers).max() <= len(span.numbers):
@@ -108,11 +108,50 @@ def test_clocks_far_off_are_possible_and_rare():
     assert usual > slow > far > usual - math.log(300.0)
 
 
+ONSETS = {
+    "known": (1.2, swept(1.2, 1.21, 1.0 + np.linspace(-0.1, 0.1, 801))),
+    "range": (OnsetRange(-3.0, 5.0), swept(-3.0, 5.4, RATES, step_s=0.009)),
+    "open": (None, swept(0.0, 3.0, RATES, step_s=0.009)),
+}
+
+
+def weights_of(onset, timings):
+    """The weight of each centre that is nearest to one of the timings."""
+    found = {}
+    for timing in timings:
+        span = span_of(timing, backwards=onset is None)
+        centre, log_weight = centred(span, timing, onset)
+        pivot = 0 if isinstance(onset, float) else int(span.numbers[len(span.numbers) // 2])
+        begins_s = centre.onset_s + pivot * span.window_ticks / centre.rate_hz
+        found[(round(begins_s, 6), round(centre.rate_hz, 9))] = math.exp(log_weight)
+    return found
+
+
+@pytest.mark.parametrize(("onset", "timings"), ONSETS.values(), ids=ONSETS)
+def test_whichever_centre_is_chosen_all_weigh_one_at_most(onset, timings):
+    weights = weights_of(onset, timings)
+    assert len(weights) > 20
+    assert 0.3 < sum(weights.values()) <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize(("onset", "timings"), ONSETS.values(), ids=ONSETS)
+def test_a_timing_is_well_within_its_centre_s_neighbourhood(onset, timings):
+    for timing in timings[:: max(1, len(timings) // 200)]:
+        span = span_of(timing, backwards=onset is None)
+        near = neighbourhood(span, centred(span, timing, onset)[0], onset)
+        numbers = span.numbers - (0 if onset == 1.2 else span.numbers[len(span.numbers) // 2])
+        # What the neighbourhood reaches beyond the timing, at the middle of the recording and at its end.
+        begins_s = 1.2 if onset == 1.2 else timing.onset_s + (span.numbers[0] - numbers[0]) * 150 / timing.rate_hz
+        away_s = near.starts_s - (begins_s + numbers * 150 / timing.rate_hz)
+        middle = int(np.argmin(np.abs(numbers)))
+        assert away_s[:, middle].min() <= -0.5 * STEP_S
+        assert away_s[:, middle].max() >= 0.5 * STEP_S
+        assert np.abs(away_s).max(axis=1).min() <= 0.75 * STEP_S
+
+
 def test_a_known_onset_costs_less_than_an_open_one():
     timing = Timing(1.0, RATE_HZ)
-    known, near, open_ = (
-        neighbourhood(span_of(timing), timing, onset).log_prior for onset in (1.0, OnsetRange(0.0, 2.0), None)
-    )
+    known, near, open_ = (centred(span_of(timing), timing, onset)[1] for onset in (1.0, OnsetRange(0.0, 2.0), None))
     assert known > near > open_
 
 
