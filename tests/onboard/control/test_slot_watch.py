@@ -283,7 +283,7 @@ def test_a_step_to_a_day_without_a_key_is_told_and_silent(tmp_path):
     assert any(unix_s > NOON_UNIX_S + 45.0 for unix_s, _ in noise)
 
 
-def test_a_disclosed_key_is_played_between_a_robot_s_own_messages(tmp_path):
+def test_a_disclosed_key_is_played_between_own_messages(tmp_path):
     """By the public channel's slots, and with a place of its own in the ledger."""
     master = Key("fake-key", generate_master("fake-key", SCHEME, date(2027, 1, 1), 60).holding, SCHEME)
     own, public = issued(date(2027, 1, 15), 1), public_key(anchor_of(master))

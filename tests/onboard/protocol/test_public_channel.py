@@ -6,7 +6,7 @@ from datetime import UTC, date, datetime, timedelta
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mtm_onboard.protocol import Channel, MtmError, load_key
@@ -77,6 +77,7 @@ def test_its_secrets_are_those_of_the_anchor_s_stream():
     assert expected != MASTER.holding.channel_secret(epoch_of_day(FIRST, SCHEME), 2)
 
 
+@settings(max_examples=12)
 @given(days, st.integers(1, 366))
 def test_what_later_days_carry_is_the_disclosed_key(day, later):
     key = carried_key(ANCHOR, link_of(day), day + timedelta(later))
@@ -86,6 +87,7 @@ def test_what_later_days_carry_is_the_disclosed_key(day, later):
     assert key.holding.channel_secret(epoch, 1) == MASTER.holding.channel_secret(epoch, 1)
 
 
+@settings(max_examples=12)
 @given(days, st.integers(0, 255))
 def test_what_is_made_up_is_denied(day, bit):
     made_up = (int.from_bytes(link_of(day), "big") ^ 1 << bit).to_bytes(32, "big")
