@@ -124,8 +124,11 @@ def read_rate(parameters: Values, seed: int) -> dict[str, Scalar]:
 
 def read_matched(codebook: Codebook, kinds: Sequence[tuple[Sequence[Channel], Sequence[Motion]]]) -> Integers:
     """Symbols (robots, windows), without knowing the plant; what velocities and turning say is added up."""
-    scores: Floats | float = 0.0
-    for channels, motions in kinds:
+    found: dict[int, Floats] = {}
+    # As `decode` does: what turning says of the symbols helps the velocities, read once more, to learn the plant.
+    order = [*range(len(kinds)), *([0] if len(kinds) > 1 else [])]
+    for kind in order:
+        channels, motions = kinds[kind]
         timing = Timing(ONSET_S, codebook.scheme.rate_hz)
         windows = [
             make_window(codebook, channel, motion, timing, robot, window, window)
@@ -133,8 +136,10 @@ def read_matched(codebook: Codebook, kinds: Sequence[tuple[Sequence[Channel], Se
             for window in range(WINDOWS)
         ]
         noise = fit_recording_noise(motions, [motion.velocities for motion in motions])
-        scores = scores + np.array(estimate(windows, motions, noise).ratios)
-    decided: Integers = np.asarray(np.argmax(scores, axis=1)).reshape(-1, WINDOWS)
+        others = [ratios for other, ratios in found.items() if other != kind]
+        elsewhere = list(np.sum(others, axis=0)) if others else None
+        found[kind] = np.array(estimate(windows, motions, noise, elsewhere=elsewhere).ratios)
+    decided: Integers = np.asarray(np.argmax(np.sum(list(found.values()), axis=0), axis=1)).reshape(-1, WINDOWS)
     return decided
 
 

@@ -1,6 +1,6 @@
 """The matched detector behind the common interface."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from mtm_audit.detectors.matched.byclock import Found
 from mtm_audit.detectors.matched.correlate import Prepared, prepare
 from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recording_noise
 from mtm_audit.detectors.matched.fleet import Member, share_timings
+from mtm_audit.detectors.matched.kinds import elsewhere, reading_order
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
 from mtm_audit.detectors.matched.noise import principal_axes
 from mtm_audit.detectors.matched.profile import PlantProfile
@@ -66,8 +67,11 @@ class MatchedDetector:
                 refusals[number] = refusal
                 del motions[number]
         readings: dict[int, ChannelReading] = {}
-        for numbers in _kinds(motions, glimpses):
-            readings |= self._read_together(codebook, channels, prepared, numbers, searched, onset)
+        for numbers in reading_order(_kinds(motions, glimpses), channels, searched):
+            others = {
+                channels[number].name: found.reading for number, found in readings.items() if number not in numbers
+            }
+            readings |= self._read_together(codebook, channels, prepared, numbers, searched, onset, others)
         for number, reading in readings.items():
             own = alone[number][0]
             readings[number] = replace(reading, alone=own.timing, alone_strength=own.evidence)
@@ -108,20 +112,25 @@ class MatchedDetector:
         numbers: Sequence[int],
         searched: dict[int, list[Found]],
         onset: Onset,
+        others: Mapping[str, Reading],
     ) -> dict[int, ChannelReading]:
-        """Symbols of all observations that hold enough, with a plant that they may share."""
+        """Symbols of all observations that hold enough, with a plant that they may share.
+
+        `others` by channel name is what motion of other kinds, which carries the same symbols, has shown.
+        """
         moved = [prepared[number].motion for number in numbers]
         own = [channels[number] for number in numbers]
         noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
         timings = [searched[number][0].timing for number in numbers]
         shown = [shown_numbers(codebook, *each, onset) for each in zip(own, moved, timings, strict=True)]
         windows = _all_windows(codebook, own, moved, timings, shown)
-        found = estimate(windows, moved, noise, self._profile)
+        names = [channel.name for channel in own]
+        found = estimate(windows, moved, noise, self._profile, elsewhere(windows, names, timings, others))
         better = refined_timing(found, windows, moved, timings)
         if better != timings:
             timings = better
             windows = _all_windows(codebook, own, moved, timings, shown)
-            found = estimate(windows, moved, noise, self._profile)
+            found = estimate(windows, moved, noise, self._profile, elsewhere(windows, names, timings, others))
         readings = {}
         for row, number in enumerate(numbers):
             strengths = np.array([other.evidence for other in searched[number]])

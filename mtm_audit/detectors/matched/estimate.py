@@ -42,6 +42,7 @@ class _Judged:
     overview: Floats  # (M,) log-likelihood ratios of all candidates, roughly: under the prior, then under one plant
     belief: Floats  # (L,) probabilities of the kept candidates, all repeats taken together
     signal: Floats  # (observed axes, n) expected contribution to the motion
+    elsewhere: Floats  # (M,) log-likelihood ratios of all candidates by what is not in this motion
 
 
 def fit_recording_noise(motions: Sequence[Motion], signals: Sequence[Floats]) -> NoiseModel:
@@ -66,14 +67,20 @@ class Estimate:
 
 
 def estimate(
-    windows: Sequence[Window], motions: Sequence[Motion], noise: NoiseModel, profile: PlantProfile | None = None
+    windows: Sequence[Window],
+    motions: Sequence[Motion],
+    noise: NoiseModel,
+    profile: PlantProfile | None = None,
+    elsewhere: Sequence[Floats] | None = None,
 ) -> Estimate:
     """Decide all windows of all observations; `noise` is a first model, fitted to the motion itself.
 
+    `elsewhere` are log-likelihood ratios (M,) of each window by motion of another kind, such as the robot's turning,
+    which help to learn the plant and are not part of the result.
     `profile` is what is known of the robots' plant beforehand; without it all plants are equally likely.
     """
     prior, first_prior = log_prior(profile, FINE), log_prior(profile, COARSE)
-    judged = _first_look(windows, motions, noise, first_prior)
+    judged = _first_look(windows, motions, noise, first_prior, elsewhere)
     for look in range(_ROUNDS):
         _believe(judged)
         found = _all_statistics(judged, motions, noise)
@@ -107,7 +114,11 @@ def _residuals(judged: Sequence[_Judged], motions: Sequence[Motion]) -> list[Flo
 
 
 def _first_look(
-    windows: Sequence[Window], motions: Sequence[Motion], noise: NoiseModel, prior: Floats
+    windows: Sequence[Window],
+    motions: Sequence[Motion],
+    noise: NoiseModel,
+    prior: Floats,
+    elsewhere: Sequence[Floats] | None,
 ) -> list[_Judged]:
     """Each window with the candidates that look best over all repeats of its symbol."""
     groups: dict[tuple[int, int], list[int]] = {}
@@ -119,9 +130,21 @@ def _first_look(
         for index, ratios in zip(members, found.ratios, strict=True):
             window = windows[index]
             silent = np.zeros((len(motions[window.observation].velocities), window.last - window.first))
+            others = np.zeros(len(ratios)) if elsewhere is None else elsewhere[index]
             kept = ratios[found.kept]
-            judged[index] = _Judged(window, found.kept, response_rows(window, FINE), kept, ratios, kept, silent)
+            judged[index] = _Judged(window, found.kept, response_rows(window, FINE), kept, ratios, kept, silent, others)
+    if elsewhere is not None:
+        _keep_best(list(judged.values()))
     return [judged[index] for index in range(len(windows))]
+
+
+def _keep_best(judged: Sequence[_Judged]) -> None:
+    """Keep the candidates that look best over all repeats of a symbol, whatever shows them."""
+    for members in _groups(judged):
+        total = np.sum([state.overview + state.elsewhere for state in members], axis=0)
+        kept = np.argsort(-total)[:KEPT]
+        for state in members:
+            state.kept, state.ratios = kept, state.overview[kept]
 
 
 def _groups(judged: Sequence[_Judged]) -> list[list[_Judged]]:
@@ -133,7 +156,7 @@ def _groups(judged: Sequence[_Judged]) -> list[list[_Judged]]:
 
 def _believe(judged: Sequence[_Judged]) -> None:
     for members in _groups(judged):
-        total = np.sum([state.ratios for state in members], axis=0)
+        total = np.sum([state.ratios + state.elsewhere[state.kept] for state in members], axis=0)
         belief = np.exp(total - log_sum_exp(total, axis=0))
         for state in members:
             state.belief = belief
@@ -247,12 +270,9 @@ def _look_again(
         return
     residuals = _residuals(judged, motions)
     known = {id(state): alternatives for state, alternatives in zip(judged, hypotheses, strict=True)}
-    for members in _groups(judged):
-        for state in members:
-            state.overview = _under_one_plant(state, _mean_gains(known[id(state)]), residuals, noise)
-        kept = np.argsort(-np.sum([state.overview for state in members], axis=0))[:KEPT]
-        for state in members:
-            state.kept, state.ratios = kept, state.overview[kept]
+    for state in judged:
+        state.overview = _under_one_plant(state, _mean_gains(known[id(state)]), residuals, noise)
+    _keep_best(judged)
 
 
 def _under_one_plant(state: _Judged, gains: Floats, residuals: Sequence[Floats], noise: NoiseModel) -> Floats:

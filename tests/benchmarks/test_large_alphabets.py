@@ -1,0 +1,67 @@
+"""Alphabets of 4096 and 65,536 symbols against an earlier commit, in pairs in one run: CPU time and peak memory.
+
+`MTM_BASELINE=<commit> pytest tests/benchmarks/test_large_alphabets.py --benchmark-enable -s` prints the ratios; without
+the variable the commit is the last one that weighed every candidate whole. Needs the repository's history.
+"""
+
+import os
+import subprocess
+import sys
+import tarfile
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+BASELINE = os.environ.get("MTM_BASELINE", "e9f232f")
+ROUNDS = 3
+# A minute of one robot, eight windows, onset and clock to be found; its waveforms are derived within the time.
+READ = """
+import resource, sys
+from mtm_audit.detectors.matched.detector import MatchedDetector
+from tests.benchmarks.test_matched_speed import read, recording
+taken_s, right = read(MatchedDetector(), recording(int(sys.argv[1])))
+print(taken_s, right, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+"""
+
+pytestmark = pytest.mark.skipif("not config.getoption('benchmark_enable')", reason="measures; see the docstring")
+
+
+@pytest.fixture(scope="module")
+def baseline(tmp_path_factory):
+    """A checkout of the earlier commit."""
+    folder = tmp_path_factory.mktemp("baseline")
+    packed = subprocess.run(["git", "archive", BASELINE], cwd=ROOT, capture_output=True, check=False)
+    if packed.returncode != 0:
+        pytest.skip(f"the history does not reach {BASELINE}")
+    with tarfile.open(fileobj=BytesIO(packed.stdout)) as archive:
+        archive.extractall(folder, filter="data")
+    return folder
+
+
+def read_in(checkout, alphabet):
+    """Processor time in seconds and peak memory in MB of one read, whose symbols must be right."""
+    environment = {**os.environ, "PYTHONPATH": str(checkout), "OPENBLAS_NUM_THREADS": "1"}
+    command = [sys.executable, "-c", READ, str(alphabet)]
+    done = subprocess.run(command, cwd=checkout, env=environment, capture_output=True, text=True, check=True)
+    taken_s, right, peak_mb = done.stdout.split()
+    assert right == "True"
+    return float(taken_s), float(peak_mb)
+
+
+def test_large_alphabets_take_what_4096_symbols_took(benchmark, baseline, capsys):
+    rounds = [(read_in(baseline, 4096), read_in(ROOT, 4096), read_in(ROOT, 65_536)) for _ in range(ROUNDS)]
+    quicker = sorted(then[0] / now[0] for then, now, _ in rounds)[ROUNDS // 2]
+    larger = sorted(large[0] / then[0] for then, _, large in rounds)[ROUNDS // 2]
+    peak_mb = max(large[1] for _, _, large in rounds)
+    benchmark.extra_info.update(quicker=quicker, larger=larger, peak_mb=peak_mb)
+    with capsys.disabled():
+        for then, now, large in rounds:
+            print(f"\n60 s: M = 4096 {then[0]:.1f} s then, {now[0]:.1f} s now; M = 65536 {large[0]:.1f} s, "
+                  f"{large[1]:.0f} MB", end="")  # fmt: skip
+        print(f"\nM = 4096 {quicker:.1f} times quicker; M = 65536 takes {larger:.2f} of what M = 4096 took")
+    benchmark.pedantic(lambda: None, rounds=1)
+    assert peak_mb < 500.0
+    assert quicker > 2.5
+    assert larger < 1.5
