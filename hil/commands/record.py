@@ -134,7 +134,7 @@ def _scheme(options: RecordOptions) -> Scheme:
     if isinstance(content, str | bytes):
         size = len(content.encode() if isinstance(content, str) else content)
         usual = tagged_scheme(robots, "text" if isinstance(content, str) else "bytes", 8 * max(_USUAL_BYTES, size))
-    axes = vehicle(options.plant).kind.follows
+    axes = vehicle(options.plant).kind.axes
     return replace(usual, channels=tuple(replace(channel, axes=axes) for channel in usual.channels))
 
 

@@ -92,7 +92,7 @@ def test_a_verdict_s_decoys_cost_what_they_cost(benchmark, capsys):
         assert SECONDS / taken_s >= 1.0
 
 
-@pytest.mark.parametrize("alphabet", [256, 4096, 65_536])
+@pytest.mark.parametrize("alphabet", [256, 4096, pytest.param(65_536, marks=pytest.mark.slow)])
 def test_half_a_gigabyte_of_memory_is_enough(benchmark, capsys, alphabet):
     case = recording(alphabet)
     tracemalloc.start()

@@ -78,6 +78,7 @@ def seconds_of_processor(work):
     return time.process_time() - start_s
 
 
+@pytest.mark.slow
 def test_tracking_1080p60_costs_little_beside_decoding(tmp_path, benchmark):
     camera = Camera(optics=overhead(width_px=1920, height_px=1080), rate_hz=60.0, blur_px=0.8, noise_levels=1.0)
     frames = film(camera, Scene(), four_robots(), np.random.default_rng(1), 0.0, 3.0)

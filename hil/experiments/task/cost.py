@@ -22,7 +22,7 @@ _BATCH = 10
 _LEVEL = 0.95
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Cost:
     """One measure of the drives under one scheme: means by condition, and what keyed noise has more than white.
 
@@ -81,7 +81,8 @@ def _cost(name: str, what: str, values: Mapping[str, Floats]) -> Cost:
     more, error = float(np.mean(differences)), float(stats.sem(differences))
     half = error * float(stats.t.ppf(0.5 + _LEVEL / 2.0, len(differences) - 1))
     means = {condition: float(np.mean(values[condition])) for condition in CONDITIONS}
-    return Cost(name, what, len(differences), means, more, more - half, more + half)
+    return Cost(scheme=name, measure=what, drives=len(differences), means=means, more=more, low=more - half,
+                high=more + half)  # fmt: skip
 
 
 def _cell(scheme: Scheme, condition: str, seed: int, drives: int) -> Cell:

@@ -77,6 +77,7 @@ def decoded(capsys):
     return run
 
 
+@pytest.mark.slow
 def test_two_films_and_an_anchor_verify_a_day(decoded, folder, tmp_path):
     """Nobody but the robots hands the key on: it is read from their motion, and verifies the earlier film."""
     began, anchor, found = (folder / "at.txt").read_text(), folder / "fleet.anchor", tmp_path / "found.key"
@@ -96,6 +97,7 @@ def test_two_films_and_an_anchor_verify_a_day(decoded, folder, tmp_path):
     assert re.search("rests on --at alone", " ".join(report["rests_on"]))
 
 
+@pytest.mark.slow
 def test_the_film_of_the_day_itself_shows_nothing_publicly(decoded, folder, tmp_path):
     then = json.loads((folder / "then" / "truth.json").read_text())["unix_s"]
     stated = at(datetime.fromtimestamp(then, UTC).isoformat())
@@ -106,6 +108,7 @@ def test_the_film_of_the_day_itself_shows_nothing_publicly(decoded, folder, tmp_
     assert not found.exists()
 
 
+@pytest.mark.slow
 def test_another_anchor_reads_nothing(decoded, folder, tmp_path):
     """Another anchor is another public channel, on which nothing was said."""
     text = (folder / "fleet.anchor").read_text()

@@ -17,6 +17,7 @@ def filmed(capsys, *arguments):
     return leaving.value.code or 0, captured.out, captured.err
 
 
+@pytest.mark.slow
 def test_a_filmed_lander_is_decoded_with_the_named_tracker(tmp_path, capsys):
     key = Key("lander", b"not a real secret, only for test", headline_point("lunar-lander").scheme)
     save_key(key, tmp_path / "lander.key")

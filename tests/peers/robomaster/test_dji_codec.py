@@ -78,7 +78,7 @@ def test_dji_s_client_drives_the_simulated_robot(dji, bus, node):
     assert again == pytest.approx((0.5, -0.25, 0.5236), abs=1e-4)
 
 
-def test_dji_s_codec_understands_what_the_simulated_robot_answers(dji, bus, node):
+def test_dji_s_codec_understands_the_simulated_robot_s_answers(dji, bus, node):
     for data in dji.sent:
         bus.put(data)
     node.poll(0.0)

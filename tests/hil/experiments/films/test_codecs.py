@@ -12,6 +12,7 @@ from tests.hil.commands.test_verdicts import run
 FEW = [coding for coding in CODINGS if coding.name in ("H.264 lossless", "H.264 CRF 12", "H.264 CRF 28")]
 
 
+@pytest.mark.slow
 def test_coarser_films_keep_less_of_a_small_motion(monkeypatch):
     monkeypatch.setattr(motion, "CODINGS", FEW)
     kept = kept_under_all({"motion_px": 0.03}, 1)
@@ -20,6 +21,7 @@ def test_coarser_films_keep_less_of_a_small_motion(monkeypatch):
     assert lossless > 0.8
 
 
+@pytest.mark.slow
 def test_a_rollout_tells_evidence_under_each_coding(monkeypatch):
     monkeypatch.setattr(codecs, "CODINGS", FEW[:1])
     monkeypatch.setattr(codecs, "_SECONDS", 13.5)
