@@ -399,7 +399,7 @@ def forgeries(
 ) -> None:
     """Forge messages of keys as they are made by default: splices, journals, learnt codebooks, replays, relays.
 
-    Stop it at any time: what is finished is kept, and the next run goes on. 10,000 take about 40 minutes of a core.
+    Stop it at any time: what is finished is kept, and the next run goes on. 10,000 take about an hour of a core.
     """
     with reported_console("mtm-hil forgeries", out, force=force) as console:
         from hil.commands.forgeries import forgeries as run
