@@ -128,6 +128,7 @@ def wrong_nats(calls=8):
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_keys_that_had_no_part_get_no_symbol_by_a_search():
     """Of M candidates the best has at most M times the mean, which is 1 at most; each key searches the timing."""
     track = robot_track(key_of(SMALL, OTHER_SECRET), "robot0", (1, 2, 3), 7.0, onset_s=ONSET_S)
