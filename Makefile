@@ -11,7 +11,7 @@ PYTEST :=
 # The build without CUDA where the index offers it under this number.
 TORCH := torch==2.13.0
 
-.PHONY: setup demo site test test-evidence test-audit test-others test-realtime test-slow test-all test-long test-oldest explore coverage lint peers bench mutants firmware \
+.PHONY: setup demo site test test-audit test-evidence test-hil test-others test-realtime test-slow test-all test-long test-oldest explore coverage lint peers bench mutants firmware \
   firmware-mutants deb deb-test dist constraints clean
 
 # $(call install,folder,file): the packages that a file of constraints/ names, by hash, and the project itself.
@@ -34,10 +34,10 @@ demo: $(VENV)/.hil
 	rm -rf out/demo
 	$(BIN)/mtm-hil demo --out out/demo
 
-# Two parts beside each other, the longest first, and the third as soon as one is done. What holds the wall clock's times
-# has the machine to itself, after them.
+# Two parts beside each other, the longest first, and another as soon as one is done. What holds the wall clock's times has
+# the machine to itself, after them.
 test: setup lint
-	@$(MAKE) --no-print-directory --jobs=2 test-others test-evidence test-audit
+	@$(MAKE) --no-print-directory --jobs=2 test-audit test-evidence test-hil test-others
 	@$(MAKE) --no-print-directory test-realtime
 
 QUICK := -m "not slow and not long and not peer and not realtime"
@@ -49,8 +49,11 @@ test-evidence: setup
 test-audit: setup
 	$(BIN)/pytest $(QUICK) $(PYTEST) $(EVIDENCE:%=--ignore=%) tests/audit
 
+test-hil: setup
+	$(BIN)/pytest $(QUICK) $(PYTEST) tests/hil
+
 test-others: setup
-	$(BIN)/pytest $(QUICK) $(PYTEST) --ignore=tests/audit tests
+	$(BIN)/pytest $(QUICK) $(PYTEST) --ignore=tests/audit --ignore=tests/hil tests
 
 test-realtime: setup
 	$(BIN)/pytest -m "realtime and not slow and not long and not peer" $(PYTEST) tests
