@@ -135,6 +135,8 @@ def test_commands_that_come_no_more_are_stopped_for_and_told(start, tmp_path):
     driven.moving(50)
     driven.peer.say("quiet")
     driven.node.wait_for("base commands have stopped coming")
+    # That is said when the noise goes; the robot stops later.
+    assert until(lambda: not any(driven.heard()[-1]["twist"]), 20.0)
     assert driven.interrupt() == 0
     assert read_journal(driven.journal_path).flags[-1] == STALE
     assert not any(driven.heard()[-1]["twist"])
