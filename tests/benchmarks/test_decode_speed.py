@@ -8,10 +8,7 @@ import os
 import resource
 import subprocess
 import sys
-import tarfile
 from dataclasses import replace
-from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,8 +18,8 @@ from hil.worlds.robomaster import fleet_scheme
 from mtm_onboard.protocol import Channel, Key, save_key
 from mtm_onboard.protocol.slots import slot_start_unix_s
 from tests.audit.moving_robot import robot_track
+from tests.benchmarks.earlier_commit import ROOT, checkout
 
-ROOT = Path(__file__).parents[2]
 BASELINE = os.environ.get("MTM_BASELINE", "ae2e668")
 FAKE_SECRET = bytes(range(32))
 ROUNDS = 3
@@ -36,21 +33,15 @@ pytestmark = pytest.mark.skipif("not config.getoption('benchmark_enable')", reas
 @pytest.fixture(scope="module")
 def baseline(tmp_path_factory):
     """A checkout of the earlier commit."""
-    folder = tmp_path_factory.mktemp("baseline")
-    packed = subprocess.run(["git", "archive", BASELINE], cwd=ROOT, capture_output=True, check=False)
-    if packed.returncode != 0:
-        pytest.skip(f"the history does not reach {BASELINE}")
-    with tarfile.open(fileobj=BytesIO(packed.stdout)) as archive:
-        archive.extractall(folder, filter="data")
-    return folder
+    return checkout(BASELINE, tmp_path_factory.mktemp("baseline"))
 
 
-def cpu_s(checkout, code, *arguments):
+def cpu_s(tree, code, *arguments):
     """User time of one run, and its peak memory so far in MB."""
-    environment = {**os.environ, "PYTHONPATH": str(checkout), "OPENBLAS_NUM_THREADS": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"}
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     command = [sys.executable, "-c", code, *arguments]
-    done = subprocess.run(command, cwd=checkout, env=environment, capture_output=True, check=False)
+    done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, check=False)
     assert done.returncode in (0, 3, 4), done.stderr
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
 

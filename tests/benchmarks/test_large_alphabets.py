@@ -7,13 +7,11 @@ the variable the commit is the last one that weighed every candidate whole. Need
 import os
 import subprocess
 import sys
-import tarfile
-from io import BytesIO
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.benchmarks.earlier_commit import ROOT, checkout
+
 BASELINE = os.environ.get("MTM_BASELINE", "e9f232f")
 ROUNDS = 3
 # A minute of one robot, eight windows, onset and clock to be found; its waveforms are derived within the time.
@@ -31,20 +29,14 @@ pytestmark = pytest.mark.skipif("not config.getoption('benchmark_enable')", reas
 @pytest.fixture(scope="module")
 def baseline(tmp_path_factory):
     """A checkout of the earlier commit."""
-    folder = tmp_path_factory.mktemp("baseline")
-    packed = subprocess.run(["git", "archive", BASELINE], cwd=ROOT, capture_output=True, check=False)
-    if packed.returncode != 0:
-        pytest.skip(f"the history does not reach {BASELINE}")
-    with tarfile.open(fileobj=BytesIO(packed.stdout)) as archive:
-        archive.extractall(folder, filter="data")
-    return folder
+    return checkout(BASELINE, tmp_path_factory.mktemp("baseline"))
 
 
-def read_in(checkout, alphabet):
+def read_in(tree, alphabet):
     """Processor time in seconds and peak memory in MB of one read, whose symbols must be right."""
-    environment = {**os.environ, "PYTHONPATH": str(checkout), "OPENBLAS_NUM_THREADS": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"}
     command = [sys.executable, "-c", READ, str(alphabet)]
-    done = subprocess.run(command, cwd=checkout, env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, check=True)
     taken_s, right, peak_mb = done.stdout.split()
     assert right == "True"
     return float(taken_s), float(peak_mb)

@@ -37,11 +37,6 @@ class Cost:
     low: float
     high: float
 
-    @property
-    def is_within_chance(self) -> bool:
-        """Whether the interval holds no difference at all."""
-        return self.low <= 0.0 <= self.high
-
 
 def drive_batch(parameters: Values, seed: int) -> dict[str, Scalar]:
     """Each measure of the drives of `seed` and the seeds after it, in the order of the seeds, under "<measure> <n>"."""

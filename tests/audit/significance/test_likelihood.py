@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from mtm_audit.detectors.matched.plants import plant_family
 from mtm_audit.detectors.matched.projections import Places, project
@@ -14,6 +13,7 @@ from mtm_audit.significance.gains import all_levels, orientations
 from mtm_audit.significance.likelihood import Hypotheses, approximate_log_e, log_e, log_e_of, weights
 from mtm_audit.significance.normaliser import log_mean_normal, log_mean_sphere
 from tests.audit.moving_robot import scheme_of
+from tests.audit.significance.laws import assert_mean_is_one, assert_spread_is_the_law_s, most_passing
 from tests.audit.significance.recorded import ONSET_S, prepared, tones_of, without_motion
 
 LAWS = ("ensemble", "window")
@@ -68,20 +68,13 @@ def values(power):
 @pytest.mark.parametrize("power", LAWS)
 def test_the_mean_over_keys_is_one(power):
     found, variance = values(power)
-    calm = variance < 4.0
-    assert calm.sum() >= 20
-    means = np.exp(found[calm]).mean(axis=-1)
-    errors = np.sqrt(variance[calm] / found.shape[-1])
-    # All of some dozens of means at once, by Bonferroni with a thousandth.
-    assert np.all(np.abs(means - 1.0) <= stats.norm.isf(0.0005 / calm.sum()) * errors)
+    assert_mean_is_one(found, variance)
 
 
 @pytest.mark.parametrize("power", LAWS)
 def test_the_spread_over_keys_is_what_the_law_says(power):
     found, variance = values(power)
-    calm = (variance > 0.01) & (variance < 0.5)
-    assert calm.sum() >= 5
-    assert np.exp(found[calm]).var(axis=-1) == pytest.approx(variance[calm], rel=0.35)
+    assert_spread_is_the_law_s(found, variance)
 
 
 @pytest.mark.parametrize("power", LAWS)
@@ -89,7 +82,7 @@ def test_the_spread_over_keys_is_what_the_law_says(power):
 def test_large_values_are_as_rare_as_markov_says(power, share):
     found, _ = values(power)
     passed = (found >= -np.log(share)).sum(axis=-1)
-    most = stats.binom.isf(0.001 / passed.size, found.shape[-1], share)
+    most = most_passing(found, share)
     assert np.all(passed <= most)
     mixed = np.logaddexp.reduce(found, axis=0) - np.log(len(found))
     assert np.all((mixed >= -np.log(share)).sum(axis=-1) <= most)
