@@ -22,19 +22,13 @@ def add_parser(subparsers: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def _disclose(args: argparse.Namespace) -> int:
-    from datetime import UTC, datetime
-
-    from mtm_onboard.model.wall_clock import is_synchronised
-    from mtm_onboard.protocol import MtmError, load_key
+    from mtm_onboard.commands.trusted_clock import trusted_now
+    from mtm_onboard.protocol import load_key
     from mtm_onboard.protocol.disclosure import disclosed_key, save_disclosed
 
     key = load_key(args.master)
-    if not args.allow_unsynchronised and is_synchronised() is not True:
-        raise MtmError(
-            "the kernel does not report this computer's clock as synchronised, and a day given out too early can be "
-            "forged; wait for NTP, or give --allow-unsynchronised when you have looked at the clock"
-        )
-    disclosed = disclosed_key(key, args.day, datetime.now(UTC))
+    now = trusted_now("a day given out too early can be forged", allow_unsynchronised=args.allow_unsynchronised)
+    disclosed = disclosed_key(key, args.day, now)
     save_disclosed(disclosed, args.out)
     print(f"wrote the key of {args.day} to {args.out}; once it is public, films made later prove nothing")
     return 0

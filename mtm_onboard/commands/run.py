@@ -80,20 +80,15 @@ def _asked(args: argparse.Namespace) -> "tuple[Key, Content | None]":
 
 def _carried(args: argparse.Namespace) -> "tuple[Key, Content | None]":
     """The public channel's key, and the disclosed one as its message, once that may be public."""
-    from datetime import UTC, datetime
-
-    from mtm_onboard.model.wall_clock import is_synchronised
-    from mtm_onboard.protocol import MtmError
+    from mtm_onboard.commands.trusted_clock import trusted_now
     from mtm_onboard.protocol.disclosure import load_anchor, load_disclosed
     from mtm_onboard.protocol.public_channel import link_to_carry, public_key
 
-    if not args.allow_unsynchronised and is_synchronised() is not True:
-        raise MtmError(
-            "the kernel does not report this computer's clock as synchronised, and a key played too early can be used "
-            "to forge its day; wait for NTP, or give --allow-unsynchronised when you have looked at the clock"
-        )
+    now = trusted_now(
+        "a key played too early can be used to forge its day", allow_unsynchronised=args.allow_unsynchronised
+    )
     anchor = load_anchor(args.anchor)
-    link = link_to_carry(anchor, load_disclosed(args.disclosed, anchor), datetime.now(UTC))
+    link = link_to_carry(anchor, load_disclosed(args.disclosed, anchor), now)
     return public_key(anchor), link
 
 
