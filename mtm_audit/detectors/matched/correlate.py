@@ -53,14 +53,17 @@ class Heard:
     """The motion correlated with each tone at each lag, at one rate; the same for every codebook.
 
     `projections` (observed axes, 2 K, lags): real and imaginary parts; `tones_hz` (K,); `steady` (observed axes,
-    2 K) power of each tone's whitened response in a cell; `seen` (observed axes, lags) weight of the cells that a
-    window starting there would have. Lag 0 is `lead` cells before the recording.
+    2 K) power of each tone's whitened response in a cell; `spread` (2 K,) variance of a candidate's tones over keys;
+    `seen` (observed axes, lags) weight of the cells that a window starting there would have, `cells` of them at most.
+    Lag 0 is `lead` cells before the recording.
     """
 
     projections: NDArray[np.float32]
     tones_hz: Floats
     steady: Floats
+    spread: Floats
     seen: Floats
+    cells: int
 
 
 def hear(prepared: Prepared, codebook: Codebook, channel: Channel, rate_hz: float, lead: int) -> Heard:
@@ -83,7 +86,9 @@ def hear(prepared: Prepared, codebook: Codebook, channel: Channel, rate_hz: floa
     weights[:, lead : lead + count] = prepared.weights
     steady = settled * power_response(prepared.noise_filters, tones_hz * motion.step_s)
     seen = np.maximum(_moving_sum(weights, cells)[:, :lags], 0.0)
-    return Heard(projections, tones_hz, np.concatenate([steady, steady], axis=1), seen)
+    powers = codebook.tone_powers(channel)
+    spread = np.concatenate([powers, powers]) / len(powers)
+    return Heard(projections, tones_hz, np.concatenate([steady, steady], axis=1), spread, seen, cells)
 
 
 @lru_cache(maxsize=160)
