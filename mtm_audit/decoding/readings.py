@@ -143,9 +143,13 @@ class _Reader:
         """What all channels say with these tracks, in the frame in which they say most."""
         channels = [channel for channel in self.scheme.channels if channel.body in association.glimpses]
         frames = frames_of(channels, association.glimpses.values())
-        views = [self._view(channels, association, frame) for frame in frames]
-        best = max(views, key=lambda view: view.rank)
-        sums = np.max([view.strengths for view in views], axis=0)
+        best = self._view(channels, association, frames[0])
+        sums = best.strengths
+        # One after the other, since what a large alphabet's candidates say takes memory.
+        for frame in frames[1:]:
+            view = self._view(channels, association, frame)
+            sums = np.maximum(sums, view.strengths)
+            best = max(best, view, key=lambda each: each.rank)
         message = None if best.message is None else best.message.discounted(math.log(len(frames)))
         decoys = None
         if len(self.codebooks) > 1 and best.parts:
@@ -163,6 +167,24 @@ class _Reader:
         )
 
     def _view(self, channels: Sequence[Channel], association: Association, frame: ReferenceFrame) -> _View:
+        read, refusals = self._apart(channels, association, frame)
+        log_evidence = self.detector.strength_law == "log evidence"
+        # What a channel's parts say is not kept beside what they say together.
+        parts = {name: together(read.pop(name), log_evidence=log_evidence) for name in list(read)}
+        weighed = self._weighed(parts, association)
+        return _View(
+            frame=frame,
+            parts=parts,
+            refusals={name: refusal for name, refusal in refusals.items() if name not in parts},
+            weighed=weighed,
+            message=self._message(weighed) if weighed else None,
+            strengths=_strengths(self.scheme, parts, association) if parts else np.zeros(len(self.codebooks)),
+        )
+
+    def _apart(
+        self, channels: Sequence[Channel], association: Association, frame: ReferenceFrame
+    ) -> tuple[dict[str, list[Part]], dict[str, MtmError]]:
+        """By channel name its parts, each by itself, and why others could not be read."""
         observations = [
             observation
             for channel in channels
@@ -177,17 +199,7 @@ class _Reader:
                 refusals[observation.channel.name] = result
             else:
                 read.setdefault(observation.channel.name, []).append(Part(observation.channel, result))
-        log_evidence = self.detector.strength_law == "log evidence"
-        parts = {name: together(each, log_evidence=log_evidence) for name, each in read.items()}
-        weighed = self._weighed(parts, association)
-        return _View(
-            frame=frame,
-            parts=parts,
-            refusals={name: refusal for name, refusal in refusals.items() if name not in parts},
-            weighed=weighed,
-            message=self._message(weighed) if weighed else None,
-            strengths=_strengths(self.scheme, parts, association) if parts else np.zeros(len(self.codebooks)),
-        )
+        return read, refusals
 
     def _weighed(self, parts: Mapping[str, Sequence[Part]], association: Association) -> list[WeighedPart]:
         """What exact evidence is made of, with the choice of tracks paid for; none without prepared motions."""

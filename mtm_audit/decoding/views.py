@@ -6,6 +6,7 @@ Each is read as if it were a channel, and what they say is added up.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 from scipy.special import softmax
@@ -95,8 +96,10 @@ def together(parts: Sequence[Part], *, log_evidence: bool) -> list[Part]:
     results = [part.result for part in shared]
     scale = 1.0 if log_evidence else 1.0 / len(shared)
     scores = scale * np.sum([result.reading.scores for result in results], axis=0)
-    window_scores = scale * np.sum([result.reading.window_scores for result in results], axis=0)
-    ratios = np.sum([result.window_ratios for result in results], axis=0)
+    ratios = reduce(np.add, [result.window_ratios for result in results])
+    # Scores that are log-likelihood ratios are held once.
+    alike = log_evidence and all(result.window_ratios is result.reading.window_scores for result in results)
+    window_scores = ratios if alike else scale * reduce(np.add, [result.reading.window_scores for result in results])
     log_posteriors = np.sum([np.log(np.maximum(result.posteriors, _LEAST)) for result in results], axis=0)
     strength = scale * sum(result.reading.strength for result in results)
     decoys = scale * np.sum([result.decoy_strengths for result in results], axis=0)

@@ -100,14 +100,13 @@ class ChannelTerms:
         return np.stack([table[..., self.positions == place, :].sum(axis=-2) for place in self.shown], axis=-2)
 
     def mixed(self, table: Floats, without: int | None = None) -> Floats:
-        """Log mean over all symbols of e-values (..., groups, k), or nothing sent: (..., shown positions).
+        """Log mean over all symbols of e-values (..., shown positions, k), or nothing sent: (..., shown positions).
 
         Symbols not looked at, and the symbol `without`, count nothing.
         """
-        summed = self.by_position(table)
         if without is not None:
-            summed = np.where(self.candidates == without, -np.inf, summed)
-        return or_silent(log_sum_exp(summed, axis=-1) - np.log(self.alphabet_size))
+            table = np.where(self.candidates == without, -np.inf, table)
+        return or_silent(log_sum_exp(table, axis=-1) - np.log(self.alphabet_size))
 
 
 def or_silent(log_values: Floats, count: int = 1) -> Floats:
@@ -120,7 +119,7 @@ class Terms:
     """Tables of one channel around one timing.
 
     Pairs of a timing and a plant, `timings` and `plants` (pairs,) with `log_priors` (pairs,), the camera's and the
-    loudness' apart; `coarse` (pairs, coarse levels, orientations, groups, k) approximate log e-values.
+    loudness' apart; `coarse` (pairs, coarse levels, orientations, shown positions, k) approximate log e-values.
     """
 
     channel: ChannelTerms
@@ -132,13 +131,13 @@ class Terms:
     _fine: dict[int, Floats] = field(default_factory=dict, repr=False, compare=False)
 
     def fine(self, pairs: Integers) -> Floats:
-        """Approximate log e-values of some pairs: (pairs, levels, orientations, groups, k)."""
+        """Approximate log e-values of some pairs: (pairs, levels, orientations, shown positions, k)."""
         for pair in pairs:
             if int(pair) not in self._fine:
                 at = np.array([pair])
                 self._fine[int(pair)] = approximate_log_e(
                     self.projections, self.channel.tones, all_levels(), self.channel.turns,
-                    self.timings[at], self.plants[at],
+                    self.timings[at], self.plants[at], self.channel.by_position,
                 )[0]  # fmt: skip
         return np.stack([self._fine[int(pair)] for pair in pairs])
 
@@ -163,7 +162,7 @@ class Terms:
         channel = self.channel
         table = self.exact(chosen)
         if not channel.shared or len(channel.shown) == 1:
-            return np.asarray(channel.mixed(table).sum(axis=-1))
+            return np.asarray(channel.mixed(channel.by_position(table)).sum(axis=-1))
         best = table.max(axis=0)
         symbols = channel.candidates[np.arange(len(best)), np.argmax(best, axis=1)]
         linear, quadratic = weights(self.projections, all_levels(), channel.turns, chosen)
@@ -257,7 +256,9 @@ def _terms_at(channel: ChannelTerms, timing: Timing, near: Neighbourhood) -> Ter
         for grid in np.meshgrid(np.arange(len(near.log_priors)), np.arange(len(SHAPES.taps)), indexing="ij")
     )
     log_priors = near.log_priors[timings] - np.log(len(SHAPES.taps))
-    coarse = approximate_log_e(projections, channel.tones, coarse_levels(), channel.turns, timings, plants)
+    coarse = approximate_log_e(
+        projections, channel.tones, coarse_levels(), channel.turns, timings, plants, channel.by_position
+    )
     return Terms(channel, projections, timings, plants, log_priors, coarse)
 
 

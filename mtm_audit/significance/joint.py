@@ -159,7 +159,7 @@ def _under_prior(witness: Witness, count: int) -> _Weighted:
     """The hypotheses that say most of the whole channel, at their prior probability."""
     item = witness.item
     chosen, log_priors = item.chosen
-    said = log_priors + item.channel.mixed(item.by_group).sum(axis=-1)
+    said = log_priors + item.channel.mixed(item.exact).sum(axis=-1)
     places = largest(said, count)
     return _Weighted(log_priors[places], *weights_of(item.terms, _some(chosen, places)))
 

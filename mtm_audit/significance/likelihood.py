@@ -6,6 +6,7 @@ had no part in the motion, t is drawn by the key stream's own law whatever the r
 mean over that law (`normaliser`) has mean 1 over keys: it is an e-value.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,23 +33,32 @@ class Hypotheses:
 
 
 def approximate_log_e(
-    projections: Projections, tones: Floats, levels: Levels, turns: Floats, timings: Integers, plants: Integers
+    projections: Projections,
+    tones: Floats,
+    levels: Levels,
+    turns: Floats,
+    timings: Integers,
+    plants: Integers,
+    by_position: Callable[[Floats], Floats],
 ) -> Floats:
-    """Log e-values of pairs of a timing and a plant: (pairs, levels, orientations, groups, candidates).
+    """Log e-values of pairs of a timing and a plant: (pairs, levels, orientations, positions, candidates).
 
-    `tones` (groups, candidates, injected axes, 2 K); `timings` and `plants` (pairs,). With observed axes that leave
+    `tones` (groups, candidates, injected axes, 2 K); `timings` and `plants` (pairs,); `by_position` adds up the groups
+    of a position, some pairs after the others, since a table of all groups is large. With observed axes that leave
     each other's precision alone and tones taken to be normal: to choose hypotheses and to weigh them, never as
     evidence.
     """
     groups, candidates = tones.shape[:2]
     each = len(levels.magnitudes) * len(turns) * groups * candidates
     step = max(1, _MOST_TOGETHER // each)
-    return np.concatenate(
-        [
-            _approximate(projections, tones, levels, turns, timings[at : at + step], plants[at : at + step])
-            for at in range(0, len(timings), step)
-        ]
-    )
+    result = np.empty(0)
+    for at in range(0, len(timings), step):
+        some = slice(at, at + step)
+        table = by_position(_approximate(projections, tones, levels, turns, timings[some], plants[some]))
+        if at == 0:
+            result = np.empty((len(timings), *table.shape[1:]))
+        result[some] = table
+    return result
 
 
 def _approximate(

@@ -42,7 +42,7 @@ def sequences(item: WeighedChannel) -> list[Sequence]:
     """The messages that are likeliest, by this channel alone and by all that was read together: different ones."""
     channel = item.channel
     chosen, log_priors = item.chosen
-    alone = likeliest(item.exact, log_priors + channel.mixed(item.by_group).sum(axis=-1))
+    alone = likeliest(item.exact, log_priors + channel.mixed(item.exact).sum(axis=-1))
     # Candidates stand in the order of what all parts of a channel say together.
     messages = [alone] if not alone.any() else [alone, np.zeros_like(alone)]
     found = []
@@ -63,7 +63,7 @@ def continued(first: Sequence, channel: ChannelTerms, terms: Terms) -> float:
     rows = np.arange(len(first.columns))
 
     def said(table_of: TableOf) -> Floats:
-        table = channel.by_position(table_of(terms))
+        table = table_of(terms)
         return np.asarray(or_silent(table[..., rows, first.columns]).sum(axis=-1))
 
     pairs, places, _ = selected(terms, log_pairs, said)

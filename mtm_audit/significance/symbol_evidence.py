@@ -115,14 +115,14 @@ def _together(own: Sequence[WeighedChannel], showing: Sequence[int], position: i
 
     def said(tables_of: TableOf) -> Floats:
         found = []
-        for channel, terms, place in zip(channels, tables, places, strict=True):
+        for terms, place in zip(tables, places, strict=True):
             if place is not None:
-                found.append(or_silent(channel.by_position(tables_of(terms))[..., place[0], place[1]]))
+                found.append(or_silent(tables_of(terms)[..., place[0], place[1]]))
         return np.asarray(np.sum(found, axis=0))
 
     first = tables[0]
     pairs, chosen, _ = selected(first, first.log_priors, said)
-    exact = said(lambda table: table.exact(table.hypotheses(pairs, chosen)))
+    exact = said(lambda table: table.channel.by_position(table.exact(table.hypotheses(pairs, chosen))))
     return float(logsumexp(exact + log_prior(first.channel, first.log_priors[pairs]).ravel()[chosen]))
 
 

@@ -16,7 +16,7 @@ from mtm_audit.significance.likelihood import Hypotheses
 from mtm_audit.significance.neighbourhood import at_phase_of
 
 Integers = NDArray[np.int64]
-# Takes one of a channel's tables out of its terms, and what channels say by such tables.
+# Takes one of a channel's tables, by shown position, out of its terms; and what channels say by such tables.
 TableOf = Callable[[Terms], Floats]
 Said = Callable[[TableOf], Floats]
 

@@ -68,9 +68,9 @@ class MatchedDetector:
                 del motions[number]
         readings: dict[int, ChannelReading] = {}
         for numbers in reading_order(_kinds(motions, glimpses), channels, searched):
-            others = {
-                channels[number].name: found.reading for number, found in readings.items() if number not in numbers
-            }
+            # What is read again is not kept meanwhile.
+            readings = {number: found for number, found in readings.items() if number not in numbers}
+            others = {channels[number].name: found.reading for number, found in readings.items()}
             readings |= self._read_together(codebook, channels, prepared, numbers, searched, onset, others)
         for number, reading in readings.items():
             own = alone[number][0]
@@ -128,6 +128,7 @@ class MatchedDetector:
         found = estimate(windows, moved, noise, self._profile, elsewhere(windows, names, timings, others))
         better = refined_timing(found, windows, moved, timings)
         if better != timings:
+            del found
             timings = better
             windows = _all_windows(codebook, own, moved, timings, shown)
             found = estimate(windows, moved, noise, self._profile, elsewhere(windows, names, timings, others))
@@ -262,7 +263,8 @@ def _reading(
     strength: float,
 ) -> Reading:
     mine = [index for index, window in enumerate(windows) if window.observation == number]
-    ratios = np.stack([found.ratios[index] for index in mine])
+    # One observation's windows follow each other, so that this is a part of what is held and no copy.
+    ratios = found.ratios[mine[0] : mine[-1] + 1]
     numbers = np.array([windows[index].number for index in mine])
     positions = np.mod(numbers, channel.symbols)
     scores = np.zeros((channel.symbols, codebook.scheme.alphabet_size))

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import log_softmax, softmax
 
+from mtm_audit.detectors.matched.candidates import WHOLE
 from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, half_log_evidence, log_sum_exp
 from mtm_audit.detectors.matched.first_pass import KEPT, first_pass
 from mtm_audit.detectors.matched.motion import Motion
-from mtm_audit.detectors.matched.noise import NoiseModel, fit_noise_by_axis, model_order
+from mtm_audit.detectors.matched.noise import NoiseModel, fit_noise_by_axis, model_order, whitened_from_silence
 from mtm_audit.detectors.matched.plants import COARSE, FINE
 from mtm_audit.detectors.matched.profile import PlantProfile, log_prior
 from mtm_audit.detectors.matched.windows import (
@@ -24,7 +25,6 @@ from mtm_audit.detectors.matched.windows import (
     pulled_by,
     response_rows,
     statistics,
-    whitened_from_start,
 )
 from mtm_audit.model.track import Floats
 
@@ -37,9 +37,12 @@ class _Judged:
 
     window: Window
     kept: np.ndarray
+    tones: Floats  # (L, A, 2 K) of the kept candidates
     rows: Floats
     ratios: Floats  # (L,) log-likelihood ratios of the kept candidates, nats
-    overview: Floats  # (M,) log-likelihood ratios of all candidates, roughly: under the prior, then under one plant
+    # (M,) log-likelihood ratios of all candidates, roughly: under the prior, then under one plant. Those of a large
+    # alphabet are in single precision, in which they are weighed.
+    overview: Floats
     belief: Floats  # (L,) probabilities of the kept candidates, all repeats taken together
     signal: Floats  # (observed axes, n) expected contribution to the motion
     elsewhere: Floats  # (M,) log-likelihood ratios of all candidates by what is not in this motion
@@ -53,13 +56,13 @@ def fit_recording_noise(motions: Sequence[Motion], signals: Sequence[Floats]) ->
 
 @dataclass(frozen=True)
 class Estimate:
-    """`ratios`: for each window log-likelihood ratios (M,) in nats, this waveform against none; `signals`: what each
-    window is expected to add to the motion, (observed axes, n); `residuals`: each observation's motion less all of
-    them; `noise`: the interference as it is known in the end; `plants`: probabilities of the plants of `FINE`, as
-    all windows together show them when all robots share one.
+    """`ratios` (windows, M): log-likelihood ratios in nats, this waveform against none; `signals`: what each window
+    is expected to add to the motion, (observed axes, n); `residuals`: each observation's motion less all of them;
+    `noise`: the interference as it is known in the end; `plants`: probabilities of the plants of `FINE`, as all windows
+    together show them when all robots share one.
     """
 
-    ratios: tuple[Floats, ...]
+    ratios: Floats
     signals: tuple[Floats, ...]
     residuals: tuple[Floats, ...]
     noise: NoiseModel
@@ -80,7 +83,10 @@ def estimate(
     `profile` is what is known of the robots' plant beforehand; without it all plants are equally likely.
     """
     prior, first_prior = log_prior(profile, FINE), log_prior(profile, COARSE)
-    judged = _first_look(windows, motions, noise, first_prior, elsewhere)
+    count = len(windows[0].tones)
+    # All that is as large as windows times candidates: what is thought of them at first, and what is told in the end.
+    ratios: Floats = np.empty((len(windows), count), dtype=np.float32 if count > WHOLE else np.float64)
+    judged = _first_look(windows, motions, noise, first_prior, elsewhere, ratios)
     for look in range(_ROUNDS):
         _believe(judged)
         found = _all_statistics(judged, motions, noise)
@@ -92,7 +98,9 @@ def estimate(
         noise = fit_recording_noise(motions, residuals)
         if look == 0:
             _look_again(judged, hypotheses, motions, noise)
-    ratios, signals = zip(*[(_all_candidates(state), state.signal) for state in judged], strict=True)
+    for state in judged:
+        _tell_all_candidates(state)
+    signals = tuple(state.signal for state in judged)
     return Estimate(ratios, signals, tuple(residuals), noise, _shared_plants(judged, found, prior))
 
 
@@ -119,8 +127,9 @@ def _first_look(
     noise: NoiseModel,
     prior: Floats,
     elsewhere: Sequence[Floats] | None,
+    overviews: Floats,
 ) -> list[_Judged]:
-    """Each window with the candidates that look best over all repeats of its symbol."""
+    """Each window with the candidates that look best over all repeats of its symbol, and its row of `overviews`."""
     groups: dict[tuple[int, int], list[int]] = {}
     for index, window in enumerate(windows):
         groups.setdefault((window.observation, window.group), []).append(index)
@@ -130,9 +139,11 @@ def _first_look(
         for index, ratios in zip(members, found.ratios, strict=True):
             window = windows[index]
             silent = np.zeros((len(motions[window.observation].velocities), window.last - window.first))
-            others = np.zeros(len(ratios)) if elsewhere is None else elsewhere[index]
-            kept = ratios[found.kept]
-            judged[index] = _Judged(window, found.kept, response_rows(window, FINE), kept, ratios, kept, silent, others)
+            others = np.broadcast_to(0.0, len(ratios)) if elsewhere is None else elsewhere[index]
+            kept, overviews[index] = ratios[found.kept], ratios
+            rows = response_rows(window, FINE)
+            tones = window.tones.of(found.kept)
+            judged[index] = _Judged(window, found.kept, tones, rows, kept, overviews[index], kept, silent, others)
     if elsewhere is not None:
         _keep_best(list(judged.values()))
     return [judged[index] for index in range(len(windows))]
@@ -144,7 +155,8 @@ def _keep_best(judged: Sequence[_Judged]) -> None:
         total = np.sum([state.overview + state.elsewhere for state in members], axis=0)
         kept = np.argsort(-total)[:KEPT]
         for state in members:
-            state.kept, state.ratios = kept, state.overview[kept]
+            state.kept, state.ratios = kept, state.overview[kept].astype(np.float64)
+            state.tones = state.window.tones.of(kept)
 
 
 def _groups(judged: Sequence[_Judged]) -> list[list[_Judged]]:
@@ -169,7 +181,7 @@ def _all_statistics(judged: Sequence[_Judged], motions: Sequence[Motion], noise:
         window = state.window
         own = residuals[window.observation].copy()
         own[:, window.first : window.last] += state.signal
-        found.append(statistics(window, window.tones.of(state.kept), state.rows, noise, own))
+        found.append(statistics(window, state.tones, state.rows, noise, own))
     return found
 
 
@@ -245,7 +257,7 @@ def _under(data: Statistics, precision: Floats, information: Floats, prior: Floa
 
 def _expect_signals(judged: Sequence[_Judged], hypotheses: Sequence[list[_Hypothesis]], noise: NoiseModel) -> None:
     for state, alternatives in zip(judged, hypotheses, strict=True):
-        tones = np.einsum("l,lak->ak", state.belief, state.window.tones.of(state.kept))
+        tones = np.einsum("l,lak->ak", state.belief, state.tones)
         heard = np.einsum("ak,pkn->pan", tones, state.rows)
         scales = noise.scales[state.window.observation]
         state.signal = np.einsum("dpa,pan->dn", _mean_gains(alternatives), heard) * scales[:, None]
@@ -271,7 +283,7 @@ def _look_again(
     residuals = _residuals(judged, motions)
     known = {id(state): alternatives for state, alternatives in zip(judged, hypotheses, strict=True)}
     for state in judged:
-        state.overview = _under_one_plant(state, _mean_gains(known[id(state)]), residuals, noise)
+        state.overview[:] = _under_one_plant(state, _mean_gains(known[id(state)]), residuals, noise)
     _keep_best(judged)
 
 
@@ -284,15 +296,14 @@ def _under_one_plant(state: _Judged, gains: Floats, residuals: Sequence[Floats],
     responses = np.einsum("dpa,pkn->dakn", gains, state.rows, optimize=True)
     linear, quadratic = np.zeros(responses[0, ..., 0].size), 0.0
     for axis in range(len(pulled)):
-        heard = whitened_from_start(responses[axis], history, filters[axis]).reshape(len(linear), -1)
+        heard = whitened_from_silence(responses[axis], history, filters[axis]).reshape(len(linear), -1)
         linear += heard @ pulled[axis]
         quadratic = quadratic + (heard * weights[axis]) @ heard.T
     return window.tones.ratios(linear, np.asarray(quadratic))
 
 
-def _all_candidates(state: _Judged) -> Floats:
-    """Ratios of all M candidates: those dropped after a look at all stand below the worst that was kept."""
-    full = state.overview - state.overview[state.kept].min() + state.ratios.min()
-    full = np.minimum(full, state.ratios.min())
-    full[state.kept] = state.ratios
-    return np.asarray(full)
+def _tell_all_candidates(state: _Judged) -> None:
+    """Make the overview the ratios of all M: those dropped after a look at all stand below the worst that was kept."""
+    state.overview += state.ratios.min() - state.overview[state.kept].min()
+    np.minimum(state.overview, state.ratios.min(), out=state.overview)
+    state.overview[state.kept] = state.ratios

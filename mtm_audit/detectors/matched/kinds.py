@@ -39,11 +39,13 @@ def elsewhere(
         return None
     found: list[Floats] = []
     for window in windows:
-        said: Floats = np.zeros(len(window.tones))
+        said: Floats = np.broadcast_to(0.0, len(window.tones))
         other = others.get(names[window.observation])
         if other is not None:
             start_s = timings[window.observation].onset_s + window.number * window.length_s
             same = (other.window_numbers == window.number) & (np.abs(other.window_starts_s - start_s) < _SAME_WINDOW_S)
-            said = other.window_scores[same].sum(axis=0)
+            rows = np.flatnonzero(same)
+            # Mostly it is a single window, which need not be held twice.
+            said = other.window_scores[rows[0]] if len(rows) == 1 else other.window_scores[rows].sum(axis=0)
         found.append(said)
     return found

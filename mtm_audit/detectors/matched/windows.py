@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mtm_audit.detectors.matched.candidates import WindowTones
 from mtm_audit.detectors.matched.motion import Motion
-from mtm_audit.detectors.matched.noise import NoiseModel, whitened
+from mtm_audit.detectors.matched.noise import NoiseModel, whitened, whitened_from_silence
 from mtm_audit.detectors.matched.plants import TAIL_S, Plants, tone_responses
 from mtm_audit.model.timing import Onset, Timing
 from mtm_audit.model.track import Floats
@@ -155,15 +155,9 @@ def pulled_by(window: Window, noise: NoiseModel, residual: Floats) -> tuple[Floa
 def whitened_by_filter(signals: Floats, filters: Floats, history: int) -> list[tuple[NDArray[np.int64], Floats]]:
     """Signals whitened from silence, once for each filter and the observed axes that have it."""
     return [
-        (np.flatnonzero(np.all(filters == own, axis=1)), whitened_from_start(signals, history, own))
+        (np.flatnonzero(np.all(filters == own, axis=1)), whitened_from_silence(signals, history, own))
         for own in np.unique(filters, axis=0)
     ]
-
-
-def whitened_from_start(signals: Floats, history: int, whitening_filter: Floats) -> Floats:
-    """Whiten signals (plants, rows, n) that were silent in the `history` cells before their first."""
-    silent = np.zeros((*signals.shape[:2], history))
-    return whitened(np.concatenate([silent, signals], axis=2), whitening_filter)
 
 
 def _from_waveforms(waveforms: Floats, pulled: Floats, weights: Floats) -> Statistics:
@@ -188,10 +182,14 @@ def _from_tones(flat: Floats, axes: int, heard: Floats, pulled: Floats, weights:
     for axis in range(len(pulled)):
         projection = heard @ pulled[axis]
         information[axis] = (flat @ projection.T).reshape(count, axes, plants).transpose(0, 2, 1)
-        power = (heard * weights[axis]) @ heard.transpose(0, 2, 1)
-        turned = (flat @ power).reshape(plants, count, axes, width)
-        for one in range(axes):
-            for other in range(one, axes):
-                product = np.einsum("plk,lk->lp", turned[:, :, one], tones[:, other])
-                precision[axis, :, :, one, other] = precision[axis, :, :, other, one] = product
+        roots = np.sqrt(weights[axis])
+        # One plant after the other, so that nothing leaves the processor's cache meanwhile.
+        for plant, own in enumerate(heard):
+            # Written as a square, of which half is computed.
+            weighted = own * roots
+            turned = (flat @ (weighted @ weighted.T)).reshape(count, axes, width)
+            for one in range(axes):
+                for other in range(one, axes):
+                    product = np.einsum("lk,lk->l", turned[:, one], tones[:, other])
+                    precision[axis, :, plant, one, other] = precision[axis, :, plant, other, one] = product
     return Statistics(information, precision)

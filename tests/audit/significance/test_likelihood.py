@@ -139,7 +139,7 @@ def test_the_approximation_is_exact_where_axes_are_seen_alike():
     alike = projected(replace(ready, weights=weights, scales=np.ones(len(weights))))
     timings, plants = np.array([0, 1]), np.array([3, 5])
     tones = both_groups(waveforms("ensemble")[:6])
-    table = approximate_log_e(alike, tones, all_levels(), TURNS, timings, plants)
+    table = approximate_log_e(alike, tones, all_levels(), TURNS, timings, plants, lambda groups: groups)
     pair, level, turn = (grid.ravel() for grid in np.meshgrid(*map(np.arange, table.shape[:3]), indexing="ij"))
     chosen = Hypotheses(timings[pair], plants[pair], level, turn)
     exact = log_e(alike, tones, all_levels(), TURNS, chosen, "ensemble")
