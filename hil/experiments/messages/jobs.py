@@ -36,22 +36,25 @@ _TAIL_S = 0.5
 _NOON_UNIX_S = 1_769_860_800.0
 _CLOCK_ERROR_S = 30.0
 _PLAIN, _RANDOM, _SAME = "none", "another half each time", "the same half each time"
+_DROPS = "a fifth of the frames and one second"
+_DROPPED, _HIDDEN_S = 0.2, 1.0
 _TEXT_CHARACTERS = "abcdefghijklmnopqrstuvwxyz 0123456789"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Job:
-    """What each robot sends, and how much of it is recorded: `windows` symbols of an alphabet of 256, `ticks` each.
+    """What each robot sends, and how much of it is recorded: `windows` symbols of `ticks` each.
 
-    `hidden` is which half of every repetition is occluded.
+    `hidden` is what the recording lacks.
     """
 
     name: str
     framing: Framing
     windows: int
-    ticks: int
-    repetitions: int
-    hidden: str
+    alphabet_size: int = 256
+    ticks: int = 100
+    repetitions: int = 1
+    hidden: str = _PLAIN
 
     @property
     def message_s(self) -> float:
@@ -61,16 +64,31 @@ class Job:
 
 _NUMBER = Framing("integer", 64, check="tag", check_bits=32, code="reed-solomon", interleave=True)
 _TEXT = Framing("text", 128, check="tag", check_bits=32, code="reed-solomon", interleave=True)
+_LARGE = 4096
 JOBS: dict[str, Job] = {
     job.name: job
     for job in (
-        Job("64 bits in 32 s", _NUMBER, 16, 100, 1, _PLAIN),
-        Job("64 bits in 28 s", _NUMBER, 14, 100, 1, _PLAIN),
-        Job("16 bytes of text in 60 s", _TEXT, 30, 100, 1, _PLAIN),
-        Job("64 bits in 48 s, three times, half hidden", _NUMBER, 24, 100, 3, _RANDOM),
-        Job("64 bits in 48 s, three times, the same half hidden", _NUMBER, 24, 100, 3, _SAME),
+        Job(name="64 bits in 32 s", framing=_NUMBER, windows=16),
+        Job(name="64 bits in 28 s", framing=_NUMBER, windows=14),
+        Job(name="16 bytes of text in 60 s", framing=_TEXT, windows=30),
+        Job(
+            name="64 bits in 48 s, three times, half hidden", framing=_NUMBER, windows=24, repetitions=3,
+            hidden=_RANDOM,
+        ),
+        Job(
+            name="64 bits in 48 s, three times, the same half hidden", framing=_NUMBER, windows=24, repetitions=3,
+            hidden=_SAME,
+        ),
+        Job(name="64 bits in 24 s", framing=_NUMBER, windows=12, alphabet_size=_LARGE),
+        Job(name="64 bits in 20 s", framing=_NUMBER, windows=10, alphabet_size=_LARGE),
+        Job(name="64 bits in 16 s", framing=replace(_NUMBER, code="none"), windows=8, alphabet_size=_LARGE),
+        Job(name="16 bytes of text in 36 s", framing=_TEXT, windows=18, alphabet_size=_LARGE),
+        Job(
+            name="64 bits in 24 s, a fifth of the frames and one second hidden", framing=_NUMBER, windows=12,
+            alphabet_size=_LARGE, hidden=_DROPS,
+        ),
     )
-}
+}  # fmt: skip
 
 
 def receive(parameters: Values, seed: int) -> dict[str, Scalar]:
@@ -108,7 +126,7 @@ def receive(parameters: Values, seed: int) -> dict[str, Scalar]:
 def _fleet_scheme(job: Job) -> Scheme:
     plain = fleet_scheme(job.windows * job.ticks)
     channels = tuple(replace(channel, symbols=job.windows) for channel in plain.channels)
-    return replace(plain, alphabet_size=256, channels=channels, schedule="rolling")
+    return replace(plain, alphabet_size=job.alphabet_size, channels=channels, schedule="rolling")
 
 
 def _own_scheme(fleet: Scheme, channel: Channel, job: Job) -> Scheme:
@@ -128,11 +146,14 @@ def _payload(framing: Framing, draw: np.random.Generator) -> Payload:
 
 
 def _observed_track(track: Track, onset_s: float, end_s: float, job: Job, draw: np.random.Generator) -> Track:
-    """The recording from shortly before the message, with half of each repetition occluded where the job says so."""
+    """The recording from shortly before the message, without what the job hides."""
     rows = (track.times_s >= onset_s - _LEAD_S + 0.1) & (track.times_s <= end_s)
     times_s, positions, valid = track.times_s[rows], track.positions[rows], track.valid[rows].copy()
     begin = float(draw.random())
-    for repetition in range(job.repetitions if job.hidden != _PLAIN else 0):
+    if job.hidden == _DROPS:
+        hidden_s = onset_s + begin * (job.message_s - _HIDDEN_S)
+        valid &= (draw.random(len(times_s)) >= _DROPPED) & ~((times_s >= hidden_s) & (times_s < hidden_s + _HIDDEN_S))
+    for repetition in range(job.repetitions if job.hidden in (_RANDOM, _SAME) else 0):
         begin = begin if job.hidden == _SAME else float(draw.random())
         phase = ((times_s - onset_s) / job.message_s - repetition - begin) % 1.0
         inside = (times_s >= onset_s + repetition * job.message_s) & (

@@ -145,8 +145,8 @@ class _Explained:
 
 
 def _by_chance(places: Sequence[tuple["_Shifted", int]], gains: Floats, explained: _Explained) -> Floats:
-    """`_log_mean` for the gains (hypotheses, starts, pairs) of places with so many hypotheses each, one after the other:
-    (hypotheses, windows, starts).
+    """`_log_mean` (hypotheses, windows, starts) for gains (hypotheses, starts, pairs), of places with so many
+    hypotheses each, one after the other.
     """
     ends = np.cumsum([count for _, count in places])[:-1]
     return np.concatenate(
@@ -159,7 +159,7 @@ def _by_chance(places: Sequence[tuple["_Shifted", int]], gains: Floats, explaine
 
 def _log_mean(place: "_Shifted", gains: Floats, explained: _Explained) -> Floats:
     """Log of the mean likelihood ratio of normal waveforms drawn at random, (hypotheses, windows), for gains
-    (hypotheses, pairs): with weights u and q of tones of variance v it is u^2 v / (2 (1 + q v)) - log(1 + q v) / 2 each.
+    (hypotheses, pairs): a tone of weights u and q and variance v adds u^2 v / (2 (1 + q v)) - log(1 + q v) / 2.
     """
     heard = explained.heard
     observed, axes = explained.power.shape

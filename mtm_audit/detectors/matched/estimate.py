@@ -17,6 +17,7 @@ from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, half_log_evidenc
 from mtm_audit.detectors.matched.first_pass import KEPT, first_pass
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import NoiseModel, fit_noise_by_axis, model_order, whitened_from_silence
+from mtm_audit.detectors.matched.outliers import outlier_correction
 from mtm_audit.detectors.matched.plants import COARSE, FINE
 from mtm_audit.detectors.matched.profile import PlantProfile, log_prior
 from mtm_audit.detectors.matched.windows import (
@@ -93,6 +94,8 @@ def estimate(
         for _ in range(2):
             hypotheses = _judge(judged, found, prior)
             _believe(judged)
+        if look == _ROUNDS - 1:
+            _doubt_outliers(judged, found, hypotheses, motions, noise)
         _expect_signals(judged, hypotheses, noise)
         residuals = _residuals(judged, motions)
         noise = fit_recording_noise(motions, residuals)
@@ -119,6 +122,13 @@ def _residuals(judged: Sequence[_Judged], motions: Sequence[Motion]) -> list[Flo
     for state in judged:
         residuals[state.window.observation][:, state.window.first : state.window.last] -= state.signal
     return residuals
+
+
+def _without_others(state: _Judged, residuals: Sequence[Floats]) -> Floats:
+    """A window's motion less what all other windows are believed to add."""
+    own = residuals[state.window.observation].copy()
+    own[:, state.window.first : state.window.last] += state.signal
+    return own
 
 
 def _first_look(
@@ -179,19 +189,21 @@ def _all_statistics(judged: Sequence[_Judged], motions: Sequence[Motion], noise:
     found = []
     for state in judged:
         window = state.window
-        own = residuals[window.observation].copy()
-        own[:, window.first : window.last] += state.signal
+        own = _without_others(state, residuals)
         found.append(statistics(window, state.tones, state.rows, noise, own))
     return found
 
 
 @dataclass(frozen=True)
 class _Hypothesis:
-    """What one hypothesis says of one window: ratios (L,), plants (axes, plants), mean gains (axes, plants, A)."""
+    """What one hypothesis says of one window: ratios (L,), plants (axes, plants), mean gains (axes, plants, A), and the
+    precision (axes, plants, A, A) with which these are known without the window.
+    """
 
     ratios: Floats
     plants: Floats
     gains: Floats
+    known: Floats
 
 
 def _said(judged: Sequence[_Judged], found: Sequence[Statistics]) -> list[tuple[Floats, Floats]]:
@@ -247,12 +259,40 @@ def _under(data: Statistics, precision: Floats, information: Floats, prior: Floa
     gained -= alone[:, None]
     shared = np.asarray(log_softmax(alone.sum(axis=0) + prior))
     alike = log_sum_exp(gained.sum(axis=0) + shared, axis=1)
-    hypotheses = [_Hypothesis(alike, np.broadcast_to(np.exp(shared), alone.shape), gains)]
+    hypotheses = [_Hypothesis(alike, np.broadcast_to(np.exp(shared), alone.shape), gains, known)]
     if len(alone) > 1:
         own = np.asarray(log_softmax(alone + prior, axis=1))
         apart = log_sum_exp(gained + own[:, None], axis=2).sum(axis=0)
-        hypotheses.append(_Hypothesis(apart, np.exp(own), gains))
+        hypotheses.append(_Hypothesis(apart, np.exp(own), gains, known))
     return hypotheses
+
+
+def _doubt_outliers(
+    judged: Sequence[_Judged],
+    found: Sequence[Statistics],
+    hypotheses: Sequence[list[_Hypothesis]],
+    motions: Sequence[Motion],
+    noise: NoiseModel,
+) -> None:
+    """Let each kept candidate answer for the outliers that it leaves."""
+    residuals = _residuals(judged, motions)
+    for state, data, alternatives in zip(judged, found, hypotheses, strict=True):
+        likeliest = max(alternatives, key=lambda each: float(log_sum_exp(each.ratios, axis=0)))
+        own, signals = _without_others(state, residuals), _signals_of(state, data, likeliest)
+        state.ratios = state.ratios + outlier_correction(state.window, signals, noise, own)
+    _believe(judged)
+
+
+def _signals_of(state: _Judged, data: Statistics, hypothesis: _Hypothesis) -> Floats:
+    """What each kept candidate adds to the motion in units of the noise, (axes, L, n): by the likeliest plant, with the
+    gains that fit the candidate and what the other windows say.
+    """
+    axes, plants = np.arange(len(hypothesis.plants)), np.argmax(hypothesis.plants, axis=1)
+    known, gains = hypothesis.known[axes, plants], hypothesis.gains[axes, plants]
+    pulled = np.einsum("dab,db->da", known, gains)[:, None] + data.information[axes, :, plants]
+    fitted = np.linalg.solve(known[:, None] + data.precision[axes, :, plants], pulled[..., None])[..., 0]
+    tones = np.einsum("dla,lak->dlk", fitted, state.tones)
+    return np.asarray(tones @ state.rows[plants])
 
 
 def _expect_signals(judged: Sequence[_Judged], hypotheses: Sequence[list[_Hypothesis]], noise: NoiseModel) -> None:
@@ -290,8 +330,7 @@ def _look_again(
 def _under_one_plant(state: _Judged, gains: Floats, residuals: Sequence[Floats], noise: NoiseModel) -> Floats:
     """Log-likelihood ratios (M,) of all candidates of a window where the response is known."""
     window = state.window
-    own = residuals[window.observation].copy()
-    own[:, window.first : window.last] += state.signal
+    own = _without_others(state, residuals)
     pulled, weights, filters, history = pulled_by(window, noise, own)
     responses = np.einsum("dpa,pkn->dakn", gains, state.rows, optimize=True)
     linear, quadratic = np.zeros(responses[0, ..., 0].size), 0.0

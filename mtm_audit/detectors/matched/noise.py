@@ -12,7 +12,7 @@ import numpy as np
 
 from mtm_audit.model.track import Bools, Floats
 
-_DEGREES_OF_FREEDOM = 5.0
+DEGREES_OF_FREEDOM = 5.0
 _ROUNDS = 6
 # Smaller ones read drones better whose interference is quiet beside their course (of 192 messages on real motion 4 more
 # at 3e-3), and whiten a loud message away, so that evidence no longer rises with amplitude.
@@ -153,7 +153,7 @@ def _doubted(errors: Floats, weights: Floats, usable: Bools, order: int) -> tupl
     padded[:, order:] = errors
     variances = np.sum(weights * padded**2, axis=1) / max(1.0, float(usable.sum()))
     variances = np.maximum(variances, 1e-24)
-    doubt = (_DEGREES_OF_FREEDOM + 1.0) / (_DEGREES_OF_FREEDOM + padded**2 / variances[:, None])
+    doubt = (DEGREES_OF_FREEDOM + 1.0) / (DEGREES_OF_FREEDOM + padded**2 / variances[:, None])
     return np.sqrt(variances), doubt * usable
 
 
@@ -191,7 +191,7 @@ def _surprise(signal: Floats, whitening_filter: Floats, usable: Bools, scale: fl
     for _ in range(_OWN_ROUNDS):
         scales, weights = _doubted(errors, weights, usable[longest:], 0)
     squares = errors[0] ** 2 / scales[0] ** 2
-    density = np.log(scales[0]) + 0.5 * (_DEGREES_OF_FREEDOM + 1.0) * np.log1p(squares / _DEGREES_OF_FREEDOM)
+    density = np.log(scales[0]) + 0.5 * (DEGREES_OF_FREEDOM + 1.0) * np.log1p(squares / DEGREES_OF_FREEDOM)
     return float(density[usable[longest:]].sum())
 
 

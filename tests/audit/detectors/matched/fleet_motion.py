@@ -32,16 +32,30 @@ class FleetRun:
 
 
 @lru_cache(maxsize=16)
-def fleet_run(seed=1, message_ticks=150, seconds=None, *, alphabet=4, sends=True, per_channel=1, combine="split"):
-    """A run over the direct wire, filmed by motion capture, with its symbols in the order of the message."""
+def fleet_run(
+    seed=1, message_ticks=150, seconds=None, *, alphabet=4, sends=True, per_channel=1, combine="split", noon_unix_s=None
+):
+    """A run over the direct wire, filmed by motion capture, with its symbols in the order of the message.
+
+    With `noon_unix_s` the schedule is rolling, and that is the time of day at which the message begins.
+    """
     plain = fleet_scheme(message_ticks)
     channels = tuple(replace(channel, symbols=per_channel) for channel in plain.channels)
     scheme = replace(plain, channels=channels, alphabet_size=alphabet, combine=combine)
+    by_clock = {}
+    if noon_unix_s is not None:
+        scheme, by_clock = replace(scheme, schedule="rolling"), {"unix_s": noon_unix_s - START_S}
     key = Key("fake", FAKE_SECRET, scheme)
     symbols = tuple(np.random.default_rng(seed).integers(0, alphabet, scheme.message_symbols).tolist())
     seconds = START_S + message_ticks / RATE_HZ + 0.6 if seconds is None else seconds
     settings = RunSettings(
-        key=key, symbols=symbols if sends else None, seconds=seconds, seed=seed, wire="direct", start_s=START_S
+        key=key,
+        symbols=symbols if sends else None,
+        seconds=seconds,
+        seed=seed,
+        wire="direct",
+        start_s=START_S,
+        **by_clock,
     )
     tracks = motion_capture_tracks(run_lockstep(settings), seeds_of(seed).slips[0] % 1000, MotionCapture())
     return FleetRun(key, symbols, tuple(tracks))

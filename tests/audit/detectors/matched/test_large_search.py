@@ -47,7 +47,9 @@ def test_an_alphabet_in_blocks_has_the_evidence_of_the_whole(monkeypatch):
         rng.standard_normal((2, 8, 50)).astype(np.float32),
         np.arange(1.0, 5.0),
         rng.uniform(0.1, 1.0, (2, 8)),
+        np.full(8, 0.25),
         rng.uniform(0.0, 40.0, (2, 50)),
+        50,
     )
     tones = rng.standard_normal((90, 2, 8)).astype(np.float32)
     whole = correlate.evidence_by_lag([[tones]], heard)
