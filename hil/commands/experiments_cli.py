@@ -487,8 +487,16 @@ def cost(
         run(keys, drives, seed, console, workers=workers, out=out, cells=cells)
 
 
+def capacity(out: OutCsv = None, force: Force = False) -> None:
+    """Compute what one robot could send by Shannon's bound: identified robots and the RoboMaster, by axis and noise."""
+    with reported_console("mtm-hil capacity", out, force=force) as console:
+        from hil.commands.capacity import capacity as run
+
+        run(out, console)
+
+
 # In the order in which --help lists them.
 EXPERIMENTS: tuple[Callable[..., None], ...] = (
-    calibrate, bench, cameras, false_alarms, messages, disclosures, frames, shim, robustness, sweep, real, identify,
-    faults, fuzz, forgeries, attacks, cost, endurance,
+    calibrate, bench, capacity, cameras, false_alarms, messages, disclosures, frames, shim, robustness, sweep, real,
+    identify, faults, fuzz, forgeries, attacks, cost, endurance,
 )  # fmt: skip
