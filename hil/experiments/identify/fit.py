@@ -95,7 +95,7 @@ class _Oscillator:
 def fit_interference(spectra: CrossSpectra) -> FittedInterference:
     """Fit the unexplained power above 0.3 Hz by two terms of at least zero, each frequency in proportion to itself."""
     use = spectra.frequencies_hz >= _QUIET_HZ
-    frequencies, power = spectra.frequencies_hz[use], spectra.unexplained[use]
+    frequencies, power = np.asarray(spectra.frequencies_hz[use], dtype=np.float64), spectra.unexplained[use]
     # A difference of two positions, each with white noise of unit variance, divided by the bin's length; one-sided.
     tracking = 2.0 / RATE_HZ * (2.0 * RATE_HZ * np.sin(np.pi * frequencies / RATE_HZ)) ** 2
     best = (np.inf, FittedInterference(0.0, 0.1, 0.0))

@@ -39,7 +39,7 @@ AXES = {
 CREATE_PROFILE = CREATE_FILE.with_name("create_profile.toml")
 
 _RATE_HZ = 50.0
-_ROWS_HZ: Floats = 0.25 * 32.0 ** (np.arange(121, dtype=np.float64) / 120.0)
+_ROWS_HZ = np.asarray(np.geomspace(0.25, 8.0, 120), dtype=np.float64)
 _SILENCES, _SILENT_S = 12, 17.5
 
 # The axes of one robot.
