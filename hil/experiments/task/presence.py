@@ -1,5 +1,7 @@
 """Whether a message is seen in a robot's motion without the key, and told from other noise of its band.
 
+There are two noises of the same band and power: a stationary one, and one of the message's law that no key has drawn.
+
 A linear discriminant, as in `hil.experiments.attacks.steganalysis`, is trained on half of the drives, labelled, and
 ranks the others in pairs, one drive with a message and one without. The share of pairs ranked rightly is the area under
 the ROC curve (AUC); pairs have no drive in common, so that its interval is exact. There are two readers: one takes the
@@ -19,7 +21,8 @@ from hil.experiments.attacks.steganalysis import band_powers, ranked_higher
 from hil.experiments.runs.cells import Cell, CellStore, Scalar, Values
 from hil.experiments.runs.proportion import Proportion
 from hil.experiments.runs.sweep import run_sweep
-from hil.experiments.task.drive import CLEAN, KEYED, SAME_BAND, Course, course
+from hil.experiments.task.drive import Course, course
+from hil.experiments.task.noise import CLEAN, KEYED, SAME_BAND, SAME_LAW
 from hil.sensors.motion_capture import MotionCapture
 from mtm_audit.model.track import Floats
 from mtm_onboard.model.velocity import AXES
@@ -27,12 +30,13 @@ from mtm_onboard.protocol import Scheme
 from mtm_onboard.protocol.scheme import scheme_from_table
 from mtm_onboard.protocol.schemefile import scheme_text
 
+AGAINST = (CLEAN, SAME_BAND, SAME_LAW)
 BANDS, WINDOWS = "bands", "windows"
 READERS = (BANDS, WINDOWS)
 # Of the beginning of a drive; the shortest takes longer.
 LENGTHS_S = (6.0, 12.0, 24.0)
 
-_KINDS = (KEYED, CLEAN, SAME_BAND)
+_KINDS = (KEYED, *AGAINST)
 _SEEN_HZ = 10.0
 # Drives in one cell.
 _BATCH = 10
@@ -78,7 +82,7 @@ def measure_presence(
     return [
         _presence(name, plant, against, reader, seconds, found)
         for name in schemes
-        for against in (CLEAN, SAME_BAND)
+        for against in AGAINST
         for reader in READERS
         for seconds in LENGTHS_S
         if (name, against, _what(reader, seconds)) in found

@@ -10,7 +10,8 @@ from hil.cli import main
 from hil.experiments.runs.cells import CellStore
 from hil.experiments.runs.proportion import Proportion
 from hil.experiments.task import presence
-from hil.experiments.task.drive import CLEAN, SAME_BAND, WHITE, Course
+from hil.experiments.task.drive import Course
+from hil.experiments.task.noise import CLEAN, SAME_LAW, WHITE
 from hil.experiments.task.presence import BANDS, WINDOWS, Presence, measure_presence, seen_velocities, window_powers
 from hil.worlds.robomaster import fleet_scheme
 from mtm_onboard.protocol import Codebook, generate_key, save_key
@@ -24,7 +25,7 @@ SCHEME = fleet_scheme(100)
 def rows(tmp_path, monkeypatch):
     monkeypatch.setattr(presence, "LENGTHS_S", (6.0,))
 
-    def measured(scheme=SCHEME, drives=120):
+    def measured(scheme=SCHEME, drives=80):
         with CellStore(tmp_path / "cells.jsonl") as store:
             found = measure_presence(
                 {"lab": scheme}, "robomaster", drives, 0, store, Console(file=StringIO()), workers=1
@@ -34,18 +35,19 @@ def rows(tmp_path, monkeypatch):
     return measured
 
 
-def test_a_message_is_told_from_silence_but_not_from_its_band(rows):
+def test_a_message_is_told_from_silence_but_not_from_its_law(rows):
     ranked = rows()
-    assert {own.trials for own in ranked.values()} == {60}
+    assert {own.trials for own in ranked.values()} == {40}
     assert ranked[CLEAN, BANDS].percent > 85.0
     assert ranked[CLEAN, WINDOWS].percent > 85.0
-    low, high = ranked[SAME_BAND, BANDS].interval_percent
-    assert low < 50.0 < high
+    for reader in (BANDS, WINDOWS):
+        low, high = ranked[SAME_LAW, reader].interval_percent
+        assert low < 50.0 < high
 
 
 def test_noise_that_is_not_of_the_band_would_be_noticed(rows, monkeypatch):
-    monkeypatch.setattr(presence, "SAME_BAND", WHITE)
-    monkeypatch.setattr(presence, "_KINDS", ("keyed", CLEAN, WHITE))
+    monkeypatch.setattr(presence, "AGAINST", (WHITE,))
+    monkeypatch.setattr(presence, "_KINDS", ("keyed", WHITE))
     assert rows()[WHITE, BANDS].percent > 80.0
 
 
