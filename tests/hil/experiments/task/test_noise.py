@@ -61,3 +61,20 @@ def test_the_tones_of_the_same_law_change_with_the_window():
     tones = np.abs(np.fft.rfft(noise, axis=1))
     assert np.all(tones[:, [0, *range(11, 51)]] < 1e-9)
     assert np.all(tones[:, 1:11] > 0.0)
+
+
+def test_windows_put_some_of_the_power_beyond_the_band():
+    rolling = replace(SCHEME, schedule="rolling")
+    shares = {
+        condition: np.mean([_share_beyond(drawn(condition, rolling, seed=seed)) for seed in range(10)])
+        for condition in (SAME_BAND, SAME_LAW, KEYED)
+    }
+    assert shares[SAME_BAND] < 1e-4
+    assert shares[SAME_LAW] == pytest.approx(0.1, abs=0.02)
+    assert shares[KEYED] == pytest.approx(0.1, abs=0.02)
+
+
+def _share_beyond(noise):
+    hz = np.fft.rfftfreq(len(noise), 0.02)
+    power = np.abs(np.fft.rfft(noise[:, 0] * np.hanning(len(noise)))) ** 2
+    return power[(hz < 0.45) | (hz > 5.05)].sum() / power.sum()
