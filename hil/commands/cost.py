@@ -9,7 +9,7 @@ from rich.table import Table
 from hil.experiments.runs.cells import CellStore
 from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.task.cost import COLUMNS, Cost, measure_costs, rows_of
-from hil.experiments.task.drive import CONDITIONS
+from hil.experiments.task.noise import CONDITIONS
 from mtm_onboard.protocol import MtmError, load_key
 
 

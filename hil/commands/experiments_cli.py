@@ -487,8 +487,49 @@ def cost(
         run(keys, drives, seed, console, workers=workers, out=out, cells=cells)
 
 
+def presence(
+    *,
+    keys: Annotated[list[Path], typer.Argument(metavar="KEY...", help="Keys whose noise is driven with.")],
+    plant: Annotated[str, typer.Option(metavar="NAME", help="The kind of robot, as for record.")] = "robomaster",
+    drives: Annotated[int, typer.Option("-n", metavar="N", min=4, help="Drives under each kind of noise.")] = 600,
+    seed: FirstSeed = 400_000,
+    workers: Workers = None,
+    out: OutCsv = None,
+    force: Force = False,
+    cells: Cells = CELLS_FOLDER / "presence.jsonl",
+) -> None:
+    """Tell motion with a message from motion without and from unkeyed noise of the same band, without the key."""
+    with reported_console("mtm-hil presence", out, force=force) as console:
+        from hil.commands.presence import presence as run
+
+        run(keys, plant, drives, seed, console, workers=workers, out=out, cells=cells)
+
+
+def capacity(out: OutCsv = None, force: Force = False) -> None:
+    """Compute what one robot could send by Shannon's bound: identified robots and the RoboMaster, by axis and noise."""
+    with reported_console("mtm-hil capacity", out, force=force) as console:
+        from hil.commands.capacity import capacity as run
+
+        run(out, console)
+
+
+def quiet(
+    messages: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Messages at each amplitude.")] = 10,
+    seed: FirstSeed = 970_000,
+    workers: Workers = None,
+    out: OutCsv = None,
+    force: Force = False,
+    cells: Cells = CELLS_FOLDER / "quiet.jsonl",
+) -> None:
+    """Count plain messages received of an identified two-wheeled robot, by the amplitude of its noise."""
+    with reported_console("mtm-hil quiet", out, force=force) as console:
+        from hil.commands.quiet import quiet as run
+
+        run(messages, seed, console, workers=workers, out=out, cells=cells)
+
+
 # In the order in which --help lists them.
 EXPERIMENTS: tuple[Callable[..., None], ...] = (
-    calibrate, bench, cameras, false_alarms, messages, disclosures, frames, shim, robustness, sweep, real, identify,
-    faults, fuzz, forgeries, attacks, cost, endurance,
+    calibrate, bench, capacity, cameras, false_alarms, messages, disclosures, frames, shim, robustness, sweep, real,
+    identify, faults, fuzz, forgeries, attacks, cost, presence, quiet, endurance,
 )  # fmt: skip

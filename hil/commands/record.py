@@ -6,18 +6,17 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
 from hil.commands.new_folder import check_new, new_folder
+from hil.fleet.chassis import chassis_of
 from hil.fleet.lockstep import run_lockstep
 from hil.fleet.realtime import START_S, run_realtime
 from hil.fleet.recording import Sensors, write_recording
-from hil.fleet.rig import ChassisFactory, RobotReport, RunSettings, Wire
+from hil.fleet.rig import RobotReport, RunSettings, Wire
 from hil.plants.family import ROBOMASTER
-from hil.plants.robots import SteppedRobot
 from hil.sensors.camera_motion import CameraMotion
 from hil.sensors.cameras import CAMERAS, FLOORS
 from hil.sensors.film_qualities import FILM_QUALITIES
@@ -31,7 +30,6 @@ from mtm_onboard.protocol.slots import next_slot, slot_start_unix_s
 from mtm_onboard.runtime.message import Content, message_of
 
 KEY_NAME = "robot.key"
-_STREAM = 731
 # Where nothing is asked for: two of the paper's messages, and room for text that is short.
 _USUAL_S, _TAIL_S, _USUAL_BYTES = 26.0, 0.5, 8
 # From the start of the recording to the message's, in simulated time.
@@ -77,7 +75,7 @@ def record(options: RecordOptions, console: Console) -> None:
     check_new(options.out)
     if options.carried is not None:
         options = replace(options, content=options.carried[1])
-    work, chassis = arena_task(options.plant), _chassis(options.plant)
+    work, chassis = arena_task(options.plant), chassis_of(options.plant)
     key = _key(options)
     sensors = Sensors(
         camera=None if options.camera is None else replace(CAMERAS[options.camera], motion=options.motion),
@@ -156,14 +154,6 @@ def _began_unix_s(scheme: Scheme, start_s: float) -> float | None:
     if scheme.schedule != "rolling":
         return None
     return slot_start_unix_s(next_slot(time.time() + start_s, scheme), scheme) - start_s
-
-
-def _chassis(plant: str) -> ChassisFactory | None:
-    """Robots of the kind, each drawn from its own seed; None for the calibrated one, which is the rig's own."""
-    if plant == ROBOMASTER:
-        return None
-    kind = vehicle(plant).kind
-    return lambda seed, place: SteppedRobot(kind.draw(np.random.default_rng([_STREAM, seed])), seed, place)
 
 
 def _print_summary(options: RecordOptions, settings: RunSettings) -> None:

@@ -40,6 +40,12 @@ class Slip:
         return self._deviations * self._filter.advance(kicks)
 
 
+def slip_density(deviation: float, correlation_s: float, frequencies_hz: Floats) -> Floats:
+    """One-sided power density of such noise, in the square of its unit over Hz, shape as the frequencies."""
+    density = 4.0 * correlation_s * deviation**2 / (1.0 + (2.0 * np.pi * frequencies_hz * correlation_s) ** 2)
+    return np.asarray(density)
+
+
 class Gait:
     """Body sway of a walking robot: the stride and its second harmonic, whose pace and strength wander."""
 

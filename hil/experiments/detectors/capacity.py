@@ -35,24 +35,23 @@ def signal_to_interference(
     plant: MecanumParameters, sigma: float, rate_hz: float, band_hz: tuple[float, float], silences: Sequence[Motion]
 ) -> tuple[Floats, Floats]:
     """Frequencies (K,) evenly over the band, and at each the ratio of the two densities on each axis, (axes, K)."""
+    frequencies_hz = np.linspace(*band_hz, _FREQUENCIES)
+    # A sum of evenly spaced tones in the band, held over each tick and lagged.
+    sent = sigma**2 / (band_hz[1] - band_hz[0])
+    return frequencies_hz, sent * gain(plant, rate_hz, frequencies_hz) ** 2 / motion_density(silences, frequencies_hz)
+
+
+def motion_density(silences: Sequence[Motion], frequencies_hz: Floats) -> Floats:
+    """One-sided power density of each axis at those frequencies, (axes, K), the mean over motions of one time step."""
     step_s = silences[0].step_s
     measured_hz, _ = welch(silences[0].velocities, 1.0 / step_s, nperseg=_SEGMENT_BINS)
-    frequencies_hz = np.linspace(*band_hz, _FREQUENCIES)
-    mean = np.mean([_spectrum(motion) for motion in silences], axis=0)
-    interference = np.array([np.interp(frequencies_hz, measured_hz, axis) for axis in mean])
-    # A sum of evenly spaced tones in the band, held over each tick, lagged, and averaged over each time bin.
-    sent = sigma**2 / (band_hz[1] - band_hz[0])
-    gain = _gain(plant, rate_hz, step_s, frequencies_hz)
-    return frequencies_hz, sent * gain / interference
+    mean = np.mean([welch(own.velocities, 1.0 / step_s, nperseg=_SEGMENT_BINS)[1] for own in silences], axis=0)
+    measured = np.array([np.interp(frequencies_hz, measured_hz, axis) for axis in mean])
+    # Each time bin is a mean over its length.
+    return np.asarray(measured / np.sinc(frequencies_hz * step_s) ** 2)
 
 
-def _spectrum(motion: Motion) -> Floats:
-    """One-sided power density of each axis, (axes, frequencies)."""
-    density: Floats = welch(motion.velocities, 1.0 / motion.step_s, nperseg=_SEGMENT_BINS)[1]
-    return density
-
-
-def _gain(plant: MecanumParameters, rate_hz: float, step_s: float, frequencies_hz: Floats) -> Floats:
-    held, averaged = np.sinc(frequencies_hz / rate_hz), np.sinc(frequencies_hz * step_s)
-    gain: Floats = (held * averaged) ** 2 / (1.0 + (2.0 * np.pi * frequencies_hz * plant.lag_s) ** 2)
-    return gain
+def gain(plant: MecanumParameters, rate_hz: float, frequencies_hz: Floats) -> Floats:
+    """How much of noise at those frequencies the robot follows, which is held over each tick."""
+    held = np.sinc(frequencies_hz / rate_hz)
+    return np.asarray(held / np.sqrt(1.0 + (2.0 * np.pi * frequencies_hz * plant.lag_s) ** 2))

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import least_squares, nnls
 
 from hil.experiments.identify.spectra import RATE_HZ, CrossSpectra
+from hil.plants.interference import slip_density
 from hil.plants.linear_response import LinearResponse
 from mtm_audit.model.track import Floats
 
@@ -94,13 +95,12 @@ class _Oscillator:
 def fit_interference(spectra: CrossSpectra) -> FittedInterference:
     """Fit the unexplained power above 0.3 Hz by two terms of at least zero, each frequency in proportion to itself."""
     use = spectra.frequencies_hz >= _QUIET_HZ
-    frequencies, power = spectra.frequencies_hz[use], spectra.unexplained[use]
+    frequencies, power = np.asarray(spectra.frequencies_hz[use], dtype=np.float64), spectra.unexplained[use]
     # A difference of two positions, each with white noise of unit variance, divided by the bin's length; one-sided.
     tracking = 2.0 / RATE_HZ * (2.0 * RATE_HZ * np.sin(np.pi * frequencies / RATE_HZ)) ** 2
     best = (np.inf, FittedInterference(0.0, 0.1, 0.0))
     for correlation_s in _CORRELATIONS_S:
-        slip = 4.0 * correlation_s / (1.0 + (2.0 * np.pi * frequencies * correlation_s) ** 2)
-        slip *= np.sinc(frequencies / RATE_HZ) ** 2  # a bin's mean
+        slip = slip_density(1.0, correlation_s, frequencies) * np.sinc(frequencies / RATE_HZ) ** 2  # a bin's mean
         parts, misfit = nnls(np.stack([slip / power, tracking / power], axis=1), np.ones(len(power)))
         if misfit < best[0]:
             best = (

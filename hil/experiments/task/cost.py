@@ -10,7 +10,8 @@ from scipy import stats
 
 from hil.experiments.runs.cells import Cell, CellStore, Scalar, Values
 from hil.experiments.runs.sweep import run_sweep
-from hil.experiments.task.drive import CLEAN, CONDITIONS, KEYED, WHITE, Drive, drive
+from hil.experiments.task.drive import Drive, drive
+from hil.experiments.task.noise import CLEAN, CONDITIONS, KEYED, WHITE
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol import Scheme
 from mtm_onboard.protocol.scheme import scheme_from_table

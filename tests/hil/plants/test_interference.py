@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
+from scipy.signal import welch
 
-from hil.plants.interference import Gait, Slip, Sum
+from hil.plants.interference import Gait, Slip, Sum, slip_density
 
 STEP_S = 0.01
 
@@ -43,3 +44,11 @@ def test_a_gait_has_its_power_at_the_stride_and_its_harmonics():
 def test_sources_together_add_up():
     both = Sum(slip(3, 1), slip(3, 2)).advance(50)
     assert both == pytest.approx(slip(3, 1).advance(50) + slip(3, 2).advance(50))
+
+
+def test_the_density_of_slip_is_that_of_its_noise():
+    noise = slip(axes=400).advance(2000)
+    hz, measured = welch(noise, 1.0 / STEP_S, nperseg=500, axis=0)
+    # Steps of 10 ms fold some of what is higher into the higher of these.
+    near = (hz > 0.4) & (hz < 3.0)
+    assert measured[near].mean(axis=1) == pytest.approx(slip_density(0.04, 0.1, hz[near]), rel=0.05)

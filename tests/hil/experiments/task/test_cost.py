@@ -7,7 +7,8 @@ from rich.console import Console
 from hil.cli import main
 from hil.experiments.runs.cells import CellStore
 from hil.experiments.task import cost
-from hil.experiments.task.drive import KEYED, WHITE, Drive
+from hil.experiments.task.drive import Drive
+from hil.experiments.task.noise import KEYED, WHITE
 from hil.worlds.robomaster import fleet_scheme
 from mtm_onboard.protocol import generate_key, save_key
 
