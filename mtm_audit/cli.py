@@ -42,6 +42,13 @@ _Bodies = Annotated[
 _Unit = Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of a log's positions: m, cm, mm, in or ft.")]
 _TimeUnit = Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of a log's times: s, ms, us or ns.")]
 _Up = Annotated[str | None, typer.Option(metavar="AXIS", help="Axis of a log that points up: z, y, -y and so on.")]
+_HeadingAxis = Annotated[
+    str | None,
+    typer.Option(
+        metavar="AXIS",
+        help="Axis of a log's bodies that points ahead: x, z, -y and so on (default: one that is level).",
+    ),
+]
 _ArrivalTimes = Annotated[
     bool, typer.Option("--arrival-times", help="Take when messages were recorded, not the times that they carry.")
 ]
@@ -168,6 +175,7 @@ def decode(
     unit: _Unit = None,
     time_unit: _TimeUnit = None,
     up: _Up = None,
+    heading_axis: _HeadingAxis = None,
     arrival_times: _ArrivalTimes = False,
     revoked: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Key files no longer trusted, as mtm-onboard revoke lists them.")
@@ -204,11 +212,11 @@ def decode(
             at=began[0] if began else None,
             revoked=RevocationList() if revoked is None else load_revocations(revoked),
         )  # fmt: skip
-        reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        reading = _reading(topic, body, unit, time_unit, up, heading_axis, arrival_times=arrival_times)
         given = _given({
             "--tracker": tracker, "--reference": reference, "--frame-rate": frame_rate, "--topic": topic,
-            "--body": body, "--unit": unit, "--time-unit": time_unit, "--up": up, "--arrival-times": arrival_times,
-            "--at": at,
+            "--body": body, "--unit": unit, "--time-unit": time_unit, "--up": up, "--heading-axis": heading_axis,
+            "--arrival-times": arrival_times, "--at": at,
         })  # fmt: skip
         played = None if search_speed else 1.0 if speed is None else speed
         inputs = {
@@ -248,6 +256,7 @@ def look(
     unit: _Unit = None,
     time_unit: _TimeUnit = None,
     up: _Up = None,
+    heading_axis: _HeadingAxis = None,
     arrival_times: _ArrivalTimes = False,
 ) -> None:
     """Say what is in a recording, without a key: markers, colours, motion, times, and how to decode it.
@@ -257,7 +266,7 @@ def look(
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.look import LookOptions, run_look
 
-        reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        reading = _reading(topic, body, unit, time_unit, up, heading_axis, arrival_times=arrival_times)
         code = run_look(
             LookOptions(
                 paths=tuple(paths), picture=picture, as_json=as_json, frame_rate_hz=frame_rate, reading=reading,
@@ -357,6 +366,7 @@ def watch(
     "unit",
     "time_unit",
     "up",
+    "heading_axis",
     "arrival_times",
     "revoked",
 )
@@ -409,7 +419,7 @@ def batch(
         )  # fmt: skip
         reading = _reading(
             shared["topic"], shared["body"], shared["unit"], shared["time_unit"], shared["up"],
-            arrival_times=shared["arrival_times"],
+            shared["heading_axis"], arrival_times=shared["arrival_times"],
         )  # fmt: skip
         speed = None if shared["search_speed"] else 1.0 if shared["speed"] is None else shared["speed"]
         plan = Plan(
@@ -449,6 +459,7 @@ def learn_profile(
     unit: _Unit = None,
     time_unit: _TimeUnit = None,
     up: _Up = None,
+    heading_axis: _HeadingAxis = None,
     arrival_times: _ArrivalTimes = False,
 ) -> None:
     """Learn how a type of robot follows commands from a recording that decodes, for shorter ones of it.
@@ -461,10 +472,10 @@ def learn_profile(
         from mtm_audit.decoding.settings import DecodeSettings
 
         settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
-        reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        reading = _reading(topic, body, unit, time_unit, up, heading_axis, arrival_times=arrival_times)
         given = _given({
             "--tracker": tracker, "--reference": reference, "--topic": topic, "--body": body, "--unit": unit,
-            "--time-unit": time_unit, "--up": up, "--arrival-times": arrival_times,
+            "--time-unit": time_unit, "--up": up, "--heading-axis": heading_axis, "--arrival-times": arrival_times,
         })  # fmt: skip
         run_profile(
             ProfileOptions(
@@ -622,6 +633,7 @@ def _reading(
     unit: str | None,
     time_unit: str | None,
     up: str | None,
+    heading_axis: str | None,
     *,
     arrival_times: bool,
 ) -> "ReadOptions":
@@ -630,8 +642,8 @@ def _reading(
 
     with command_line_values():
         return ReadOptions(
-            unit=unit, time_unit=time_unit, up=up, topics=tuple(topics or ()), bodies=marker_groups(bodies or ()),
-            arrival_times=arrival_times,
+            unit=unit, time_unit=time_unit, up=up, heading_axis=heading_axis, topics=tuple(topics or ()),
+            bodies=marker_groups(bodies or ()), arrival_times=arrival_times,
         )  # fmt: skip
 
 

@@ -23,8 +23,9 @@ class Track:
     `times_s` (n,) strictly increasing, the recording's own clock; `positions` (n, axes) in `unit` ("m", "px",
     "rad"), NaN where not observed; `valid` (n,) False where not observed. `axes` name the columns ("x", "y").
     `headings_rad` (n,), counter-clockwise from +x in the frame of `positions`, where the tracker knows it (NaN
-    where it does not). `extent_px` is how large the body is in the picture, where a tracker knows it. An occluded body
-    is missing data, never zeros. Raises MtmError when the arrays disagree.
+    where it does not); `heading_axis` the axis of a body in three dimensions whose direction they are. `extent_px` is
+    how large the body is in the picture, where a tracker knows it. An occluded body is missing data, never zeros.
+    Raises MtmError when the arrays disagree.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Track:
     axes: tuple[str, ...] = ("x", "y")
     unit: str = "m"
     headings_rad: Floats | None = None
+    heading_axis: str | None = None
     extent_px: float | None = None
 
     def __post_init__(self) -> None:

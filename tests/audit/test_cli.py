@@ -446,6 +446,7 @@ def test_options_of_logs_reach_the_reader(audit, tmp_path):
         ("--unit", "parsec", "'parsec' is no unit of length; give one of m, dm, cm"),
         ("--time-unit", "days", "'days' is no unit of time; give one of s, ms"),
         ("--up", "w", "'w' is no axis; give one of x, y, z"),
+        ("--heading-axis", "+x", "'+x' is no axis of a body; give one of x, y, z, -x, -y, -z"),
         ("--body", "rover", "'rover' is not NAME=MARKER,MARKER"),
     ],
 )
