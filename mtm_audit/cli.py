@@ -15,6 +15,7 @@ from mtm_audit.commands.manner import HELP_OPTIONS, version_option
 from mtm_audit.commands.shared_options import takes_options_of
 
 if TYPE_CHECKING:
+    from mtm_audit.model.lens import Lens
     from mtm_audit.readers.logs.options import ReadOptions
 
 app = typer.Typer(
@@ -29,6 +30,11 @@ _TRACKER_HELP = (
     "see docs/filming.md."
 )
 
+
+_Camera = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="The calibration of a film's lens: ROS camera_info or OpenCV, YAML."),
+]
 
 # How to read a log; what they mean is in docs/formats.md.
 _Topics = Annotated[
@@ -99,6 +105,7 @@ def decode(
             metavar="TRACK,...", help="Tracks that stand still, such as markers on the floor (default: found)."
         ),
     ] = "",
+    camera: _Camera = None,
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
@@ -214,19 +221,21 @@ def decode(
         )  # fmt: skip
         reading = _reading(topic, body, unit, time_unit, up, heading_axis, arrival_times=arrival_times)
         given = _given({
-            "--tracker": tracker, "--reference": reference, "--frame-rate": frame_rate, "--topic": topic,
-            "--body": body, "--unit": unit, "--time-unit": time_unit, "--up": up, "--heading-axis": heading_axis,
-            "--arrival-times": arrival_times, "--at": at,
+            "--tracker": tracker, "--reference": reference, "--camera": camera, "--frame-rate": frame_rate,
+            "--topic": topic, "--body": body, "--unit": unit, "--time-unit": time_unit, "--up": up,
+            "--heading-axis": heading_axis, "--arrival-times": arrival_times, "--at": at,
         })  # fmt: skip
         played = None if search_speed else 1.0 if speed is None else speed
         inputs = {
             "key": key, "anchor": anchor, "disclosed key": disclosed, "profile": profile, "revocations": revoked,
+            "calibration": camera,
         }  # fmt: skip
         code = run_decode(
             DecodeOptions(
                 paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker or _TRACKER,
                 reference=_names(reference), settings=settings, as_json=as_json, plot=plot, explain=explain,
-                reading=reading, frame_rate_hz=frame_rate, speed=played, overlay=overlay_files(overlay, sheet),
+                reading=reading, frame_rate_hz=frame_rate, lens=_lens(camera), speed=played,
+                overlay=overlay_files(overlay, sheet),
                 report=None if report is None else requested(report, context.find_root().obj, inputs), force=force,
                 together=together, each_at=tuple(began) if together else (), given=given,
                 write_disclosed=write_disclosed,
@@ -277,7 +286,7 @@ def look(
 
 
 @app.command()
-@takes_options_of(decode, "reference", "assign", "threshold", "profile", "revoked")
+@takes_options_of(decode, "reference", "camera", "assign", "threshold", "profile", "revoked")
 def watch(
     source: Annotated[
         str,
@@ -340,6 +349,7 @@ def watch(
                 source=source, key=KeySource(key), tracker=tracker,
                 reference=_names(shared["reference"]), settings=settings,
                 at_unix_s=at_unix_s, at_error_s=at_error, seconds=seconds, page=page, record=record,
+                lens=_lens(shared["camera"]),
             )
         )  # fmt: skip
     raise typer.Exit(code)
@@ -351,6 +361,7 @@ def watch(
     "onset",
     "tracker",
     "reference",
+    "camera",
     "assign",
     "frame_rate",
     "speed",
@@ -425,7 +436,7 @@ def batch(
         plan = Plan(
             keys=named_keys(key, revoked), settings=settings, tracker=shared["tracker"] or _TRACKER,
             reference=_names(shared["reference"]), reading=reading, frame_rate_hz=shared["frame_rate"], speed=speed,
-            cache=None if cache is None else cache.absolute(),
+            lens=_lens(shared["camera"]), cache=None if cache is None else cache.absolute(),
         )  # fmt: skip
         code = run_batch_command(
             BatchOptions(paths=tuple(paths), plan=plan, out=out, jobs=jobs, scheduler=scheduler, force=force)
@@ -451,6 +462,7 @@ def learn_profile(
             metavar="TRACK,...", help="Tracks that stand still, such as markers on the floor (default: found)."
         ),
     ] = "",
+    camera: _Camera = None,
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
@@ -474,12 +486,22 @@ def learn_profile(
         settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
         reading = _reading(topic, body, unit, time_unit, up, heading_axis, arrival_times=arrival_times)
         given = _given({
-            "--tracker": tracker, "--reference": reference, "--topic": topic, "--body": body, "--unit": unit,
-            "--time-unit": time_unit, "--up": up, "--heading-axis": heading_axis, "--arrival-times": arrival_times,
+            "--tracker": tracker, "--reference": reference, "--camera": camera, "--topic": topic, "--body": body,
+            "--unit": unit, "--time-unit": time_unit, "--up": up, "--heading-axis": heading_axis,
+            "--arrival-times": arrival_times,
         })  # fmt: skip
         run_profile(
             ProfileOptions(
-                tuple(paths), key, out, tracker or _TRACKER, _names(reference), settings, reading, force, given
+                tuple(paths),
+                key,
+                out,
+                tracker or _TRACKER,
+                _names(reference),
+                settings,
+                reading,
+                force,
+                given,
+                _lens(camera),
             )
         )
 
@@ -609,6 +631,12 @@ def _unix_s(text: str | None) -> float | None:
 def _given(options: Mapping[str, object]) -> frozenset[str]:
     """The names of those that were given, which are not None, empty or False."""
     return frozenset(name for name, value in options.items() if value)
+
+
+def _lens(path: Path | None) -> "Lens | None":
+    from mtm_audit.readers.lens_file import read_lens
+
+    return None if path is None else read_lens(path)
 
 
 def _names(text: str) -> tuple[str, ...]:
