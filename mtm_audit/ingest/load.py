@@ -69,8 +69,10 @@ def tracked(
 ) -> list[Track]:
     """The tracks in frames, the camera's own motion taken out; `keep` receives them with it. See `load_tracks`.
 
-    What the `lens` distorts is straightened; raises MtmError when it is of pictures of another size.
+    What the `lens` distorts is straightened, and markers are told as seen from above; raises MtmError when the lens is
+    of pictures of another size.
     """
+    from mtm_audit.tracking.ground_plane import from_above
     from mtm_audit.tracking.stabilise import stabilised_tracks, unstabilised_tracks
 
     chosen = tracker(tracker_name, warn)
@@ -80,4 +82,8 @@ def tracked(
         if lens is not None:
             raise MtmError(f"the tracker {tracker_name} reads what no lens showed; leave out --camera")
         return unstabilised_tracks(chosen, frames, progress, keep)
-    return stabilised_tracks(chosen, frames, reference, warn, progress, keep, lens)
+    kept: list[Pictured] = []
+    tracks = stabilised_tracks(chosen, frames, reference, warn, progress, kept.append, lens)
+    if keep is not None:
+        keep(kept[0])
+    return from_above(tracks, kept[0].size, lens, warn, flipped=kept[0].flipped)

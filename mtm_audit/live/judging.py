@@ -22,6 +22,7 @@ from mtm_audit.model.lens import Lens
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.track import Track
 from mtm_audit.tracking.background import BackgroundFollower
+from mtm_audit.tracking.ground_plane import from_above
 from mtm_audit.tracking.stabilise import without_camera
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key
@@ -81,6 +82,7 @@ def _judged(look: Look, seen: Seen, key: Key, settings: DecodeSettings) -> Judge
     try:
         if seen.background is not None:
             tracks = without_camera(tracks, seen.background, seen.reference, seen.flipped, warnings.append, seen.lens)
+            tracks = from_above(tracks, seen.background.size, seen.lens, warnings.append, flipped=seen.flipped)
         if look.number % WHOLE_EVERY and not _is_worth_looking(look, tracks, key, settings):
             return Judged(look, None, tuple(tracks), None, tuple(warnings))
         decoding = paid_for(decode_tracks(tracks, key, settings), look.choices)

@@ -46,11 +46,16 @@ class CameraPath:
 
     def applied(self, track: Track) -> Track:
         """The track as a camera that stood still would have shown it, headings too; not valid where that is unknown."""
-        return moved_track(track, lambda places: moved(self.to_reference, places))
+        return moved_track(track, self._moved)
+
+    def _moved(self, places: Floats) -> Floats:
+        """Places (frames, ..., 2), each under the homography of its frame."""
+        between = (1,) * (places.ndim - 2)
+        return moved(self.to_reference.reshape(-1, *between, 3, 3), places)
 
 
 def moved_track(track: Track, move: Callable[[Floats], Floats]) -> Track:
-    """The track with `move` applied to its places (n, 2), headings too; not valid where that gives NaN."""
+    """The track with `move` applied to its places (n, ..., 2), headings too; not valid where that gives NaN."""
     positions = move(track.positions)
     valid = track.valid & np.isfinite(positions[:, 0])
     positions = np.where(valid[:, None], positions, np.nan)
@@ -59,7 +64,8 @@ def moved_track(track: Track, move: Callable[[Floats], Floats]) -> Track:
         # A small step along the heading, carried over with the position, points where the heading does afterwards.
         steps = move(track.positions + np.stack([np.cos(headings), np.sin(headings)], axis=1)) - positions
         headings = np.arctan2(steps[:, 1], steps[:, 0])
-    return replace(track, positions=positions, valid=valid, headings_rad=headings)
+    corners = None if track.corners is None else move(track.corners)
+    return replace(track, positions=positions, valid=valid, headings_rad=headings, corners=corners)
 
 
 def moved(homographies: Floats, points: Floats) -> Floats:
