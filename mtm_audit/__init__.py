@@ -8,8 +8,10 @@ if TYPE_CHECKING:
     from mtm_audit.decoding.decoding import ChannelDecoding, Decoding
     from mtm_audit.decoding.files import decode
     from mtm_audit.decoding.settings import DecodeSettings
+    from mtm_audit.model.lens import Lens
     from mtm_audit.model.recorded_at import RecordedAt
     from mtm_audit.model.track import Track
+    from mtm_audit.readers.lens_file import read_lens
     from mtm_audit.readers.logs.options import ReadOptions
     from mtm_audit.significance.evidence import Evidence
     from mtm_onboard.protocol.errors import MtmError
@@ -21,6 +23,7 @@ __all__ = [
     "Decoding",
     "Evidence",
     "Key",
+    "Lens",
     "MtmError",
     "ReadOptions",
     "RecordedAt",
@@ -28,6 +31,7 @@ __all__ = [
     "decode",
     "decode_tracks",
     "load_key",
+    "read_lens",
 ]
 
 # A name's module is imported when the name is first used, so that help is shown without numpy.
@@ -37,6 +41,7 @@ _MODULES = {
     "Decoding": "mtm_audit.decoding.decoding",
     "Evidence": "mtm_audit.significance.evidence",
     "Key": "mtm_onboard.protocol.key",
+    "Lens": "mtm_audit.model.lens",
     "MtmError": "mtm_onboard.protocol.errors",
     "ReadOptions": "mtm_audit.readers.logs.options",
     "RecordedAt": "mtm_audit.model.recorded_at",
@@ -44,6 +49,7 @@ _MODULES = {
     "decode": "mtm_audit.decoding.files",
     "decode_tracks": "mtm_audit.decoding.decode",
     "load_key": "mtm_onboard.protocol.key",
+    "read_lens": "mtm_audit.readers.lens_file",
 }
 
 

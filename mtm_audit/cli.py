@@ -15,6 +15,7 @@ from mtm_audit.commands.manner import HELP_OPTIONS, version_option
 from mtm_audit.commands.shared_options import takes_options_of
 
 if TYPE_CHECKING:
+    from mtm_audit.model.lens import Lens
     from mtm_audit.readers.logs.options import ReadOptions
 
 app = typer.Typer(
@@ -30,6 +31,11 @@ _TRACKER_HELP = (
 )
 
 
+_Camera = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="The calibration of a film's lens: ROS camera_info or OpenCV, YAML."),
+]
+
 # How to read a log; what they mean is in docs/formats.md.
 _Topics = Annotated[
     list[str] | None,
@@ -42,6 +48,13 @@ _Bodies = Annotated[
 _Unit = Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of a log's positions: m, cm, mm, in or ft.")]
 _TimeUnit = Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of a log's times: s, ms, us or ns.")]
 _Up = Annotated[str | None, typer.Option(metavar="AXIS", help="Axis of a log that points up: z, y, -y and so on.")]
+_HeadingAxis = Annotated[
+    str | None,
+    typer.Option(
+        metavar="AXIS",
+        help="Axis of a log's bodies that points ahead: x, z, -y and so on (default: one that is level).",
+    ),
+]
 _ArrivalTimes = Annotated[
     bool, typer.Option("--arrival-times", help="Take when messages were recorded, not the times that they carry.")
 ]
@@ -92,6 +105,7 @@ def decode(
             metavar="TRACK,...", help="Tracks that stand still, such as markers on the floor (default: found)."
         ),
     ] = "",
+    camera: _Camera = None,
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
@@ -168,6 +182,7 @@ def decode(
     unit: _Unit = None,
     time_unit: _TimeUnit = None,
     up: _Up = None,
+    heading_axis: _HeadingAxis = None,
     arrival_times: _ArrivalTimes = False,
     revoked: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Key files no longer trusted, as mtm-onboard revoke lists them.")
@@ -204,21 +219,23 @@ def decode(
             at=began[0] if began else None,
             revoked=RevocationList() if revoked is None else load_revocations(revoked),
         )  # fmt: skip
-        reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        reading = _reading(topic, body, unit, time_unit, up, heading_axis, arrival_times=arrival_times)
         given = _given({
-            "--tracker": tracker, "--reference": reference, "--frame-rate": frame_rate, "--topic": topic,
-            "--body": body, "--unit": unit, "--time-unit": time_unit, "--up": up, "--arrival-times": arrival_times,
-            "--at": at,
+            "--tracker": tracker, "--reference": reference, "--camera": camera, "--frame-rate": frame_rate,
+            "--topic": topic, "--body": body, "--unit": unit, "--time-unit": time_unit, "--up": up,
+            "--heading-axis": heading_axis, "--arrival-times": arrival_times, "--at": at,
         })  # fmt: skip
         played = None if search_speed else 1.0 if speed is None else speed
         inputs = {
             "key": key, "anchor": anchor, "disclosed key": disclosed, "profile": profile, "revocations": revoked,
+            "calibration": camera,
         }  # fmt: skip
         code = run_decode(
             DecodeOptions(
                 paths=tuple(paths), source=KeySource(key, anchor, disclosed), tracker=tracker or _TRACKER,
                 reference=_names(reference), settings=settings, as_json=as_json, plot=plot, explain=explain,
-                reading=reading, frame_rate_hz=frame_rate, speed=played, overlay=overlay_files(overlay, sheet),
+                reading=reading, frame_rate_hz=frame_rate, lens=_lens(camera), speed=played,
+                overlay=overlay_files(overlay, sheet),
                 report=None if report is None else requested(report, context.find_root().obj, inputs), force=force,
                 together=together, each_at=tuple(began) if together else (), given=given,
                 write_disclosed=write_disclosed,
@@ -248,6 +265,7 @@ def look(
     unit: _Unit = None,
     time_unit: _TimeUnit = None,
     up: _Up = None,
+    heading_axis: _HeadingAxis = None,
     arrival_times: _ArrivalTimes = False,
 ) -> None:
     """Say what is in a recording, without a key: markers, colours, motion, times, and how to decode it.
@@ -257,7 +275,7 @@ def look(
     with reported("mtm-audit", "nothing was written"):
         from mtm_audit.commands.look import LookOptions, run_look
 
-        reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        reading = _reading(topic, body, unit, time_unit, up, heading_axis, arrival_times=arrival_times)
         code = run_look(
             LookOptions(
                 paths=tuple(paths), picture=picture, as_json=as_json, frame_rate_hz=frame_rate, reading=reading,
@@ -268,7 +286,7 @@ def look(
 
 
 @app.command()
-@takes_options_of(decode, "reference", "assign", "threshold", "profile", "revoked")
+@takes_options_of(decode, "reference", "camera", "assign", "threshold", "profile", "revoked")
 def watch(
     source: Annotated[
         str,
@@ -331,6 +349,7 @@ def watch(
                 source=source, key=KeySource(key), tracker=tracker,
                 reference=_names(shared["reference"]), settings=settings,
                 at_unix_s=at_unix_s, at_error_s=at_error, seconds=seconds, page=page, record=record,
+                lens=_lens(shared["camera"]),
             )
         )  # fmt: skip
     raise typer.Exit(code)
@@ -342,6 +361,7 @@ def watch(
     "onset",
     "tracker",
     "reference",
+    "camera",
     "assign",
     "frame_rate",
     "speed",
@@ -357,6 +377,7 @@ def watch(
     "unit",
     "time_unit",
     "up",
+    "heading_axis",
     "arrival_times",
     "revoked",
 )
@@ -409,13 +430,13 @@ def batch(
         )  # fmt: skip
         reading = _reading(
             shared["topic"], shared["body"], shared["unit"], shared["time_unit"], shared["up"],
-            arrival_times=shared["arrival_times"],
+            shared["heading_axis"], arrival_times=shared["arrival_times"],
         )  # fmt: skip
         speed = None if shared["search_speed"] else 1.0 if shared["speed"] is None else shared["speed"]
         plan = Plan(
             keys=named_keys(key, revoked), settings=settings, tracker=shared["tracker"] or _TRACKER,
             reference=_names(shared["reference"]), reading=reading, frame_rate_hz=shared["frame_rate"], speed=speed,
-            cache=None if cache is None else cache.absolute(),
+            lens=_lens(shared["camera"]), cache=None if cache is None else cache.absolute(),
         )  # fmt: skip
         code = run_batch_command(
             BatchOptions(paths=tuple(paths), plan=plan, out=out, jobs=jobs, scheduler=scheduler, force=force)
@@ -441,6 +462,7 @@ def learn_profile(
             metavar="TRACK,...", help="Tracks that stand still, such as markers on the floor (default: found)."
         ),
     ] = "",
+    camera: _Camera = None,
     assign: Annotated[
         list[str] | None, typer.Option(metavar="BODY=TRACK", help="Which track shows a body; may be repeated.")
     ] = None,
@@ -449,6 +471,7 @@ def learn_profile(
     unit: _Unit = None,
     time_unit: _TimeUnit = None,
     up: _Up = None,
+    heading_axis: _HeadingAxis = None,
     arrival_times: _ArrivalTimes = False,
 ) -> None:
     """Learn how a type of robot follows commands from a recording that decodes, for shorter ones of it.
@@ -461,14 +484,24 @@ def learn_profile(
         from mtm_audit.decoding.settings import DecodeSettings
 
         settings = DecodeSettings(onset_s=onset_s, assignment=pairs)
-        reading = _reading(topic, body, unit, time_unit, up, arrival_times=arrival_times)
+        reading = _reading(topic, body, unit, time_unit, up, heading_axis, arrival_times=arrival_times)
         given = _given({
-            "--tracker": tracker, "--reference": reference, "--topic": topic, "--body": body, "--unit": unit,
-            "--time-unit": time_unit, "--up": up, "--arrival-times": arrival_times,
+            "--tracker": tracker, "--reference": reference, "--camera": camera, "--topic": topic, "--body": body,
+            "--unit": unit, "--time-unit": time_unit, "--up": up, "--heading-axis": heading_axis,
+            "--arrival-times": arrival_times,
         })  # fmt: skip
         run_profile(
             ProfileOptions(
-                tuple(paths), key, out, tracker or _TRACKER, _names(reference), settings, reading, force, given
+                tuple(paths),
+                key,
+                out,
+                tracker or _TRACKER,
+                _names(reference),
+                settings,
+                reading,
+                force,
+                given,
+                _lens(camera),
             )
         )
 
@@ -600,6 +633,12 @@ def _given(options: Mapping[str, object]) -> frozenset[str]:
     return frozenset(name for name, value in options.items() if value)
 
 
+def _lens(path: Path | None) -> "Lens | None":
+    from mtm_audit.readers.lens_file import read_lens
+
+    return None if path is None else read_lens(path)
+
+
 def _names(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
@@ -622,6 +661,7 @@ def _reading(
     unit: str | None,
     time_unit: str | None,
     up: str | None,
+    heading_axis: str | None,
     *,
     arrival_times: bool,
 ) -> "ReadOptions":
@@ -630,8 +670,8 @@ def _reading(
 
     with command_line_values():
         return ReadOptions(
-            unit=unit, time_unit=time_unit, up=up, topics=tuple(topics or ()), bodies=marker_groups(bodies or ()),
-            arrival_times=arrival_times,
+            unit=unit, time_unit=time_unit, up=up, heading_axis=heading_axis, topics=tuple(topics or ()),
+            bodies=marker_groups(bodies or ()), arrival_times=arrival_times,
         )  # fmt: skip
 
 

@@ -32,6 +32,7 @@ mtm-audit decode x.tum --key r.key --plot x.bmp
 mtm-audit decode x.tum --key r.key --unit parsec
 mtm-audit decode x.tum --key r.key --time-unit h
 mtm-audit decode x.tum --key r.key --up q
+mtm-audit decode x.tum --key r.key --heading-axis q
 mtm-audit decode x.tum --key r.key --body q
 mtm-audit decode x.tum --key r.key --threshold 0
 mtm-audit decode x.tum --key r.key --at yesterday

@@ -150,15 +150,18 @@ def disclosures(
 def cameras(
     rollouts: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Runs that each camera films.")] = 2,
     seed: CellSeed = 900_000,
+    *,
     workers: Workers = None,
     out: OutCsv = None,
     force: Force = False,
     cells: Cells = CELLS_FOLDER / "cameras.jsonl",
+    tilts: Annotated[bool, typer.Option("--tilts", help="Views from the side and a wide lens instead.")] = False,
 ) -> None:
     """Measure the evidence left by a camera that shakes, pans and rolls, and by markers at an angle."""
     with reported_console("mtm-hil cameras", out, force=force) as console:
-        from hil.commands.cameras import cameras as run
+        from hil.commands import cameras as measured
 
+        run = measured.tilts if tilts else measured.cameras
         run(rollouts, seed, workers, out, cells, console)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from mtm_audit.batch.fingerprint import decoding_fingerprint
 from mtm_audit.decoding.settings import DecodeSettings
+from mtm_audit.model.lens import Lens
 from mtm_audit.readers.logs.options import ReadOptions
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key, load_key
@@ -69,8 +70,8 @@ def _sha256(path: Path) -> str:
 class Plan:
     """How each recording is read and decoded, and under which keys.
 
-    `speed` None searches for it, as in a decode. `cache` is where tracks are kept, None the usual folder of whichever
-    machine reads them. `code` is the state of the program that made the plan.
+    `speed` None searches for it, as in a decode; `lens` is that of all films. `cache` is where tracks are kept, None
+    the usual folder of whichever machine reads them. `code` is the state of the program that made the plan.
     """
 
     keys: tuple[KeyFile, ...]
@@ -80,6 +81,7 @@ class Plan:
     reading: ReadOptions = field(default_factory=ReadOptions)
     frame_rate_hz: float | None = None
     speed: float | None = 1.0
+    lens: Lens | None = None
     cache: Path | None = None
     code: str = field(default_factory=decoding_fingerprint)
 

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import time
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from mtm_audit.batch.content import Content, content_of
 from mtm_audit.batch.fingerprint import decoding_fingerprint, reading_fingerprint
@@ -83,6 +83,7 @@ def _read(plan: Plan, source: Source) -> Recording:
         options=plan.reading,
         frame_rate_hz=plan.frame_rate_hz,
         reference=plan.reference,
+        lens=plan.lens,
     )
 
 
@@ -92,6 +93,7 @@ def _cache_name(plan: Plan, source: Source, content: Content) -> str:
     Where a film is several files, warnings may name their folder, so that a copy elsewhere is another one.
     """
     folder = str(source.files[0].parent) if len(source.files) > 1 else ""
-    asked = [plan.tracker, plan.reference, plan.frame_rate_hz, folder]
+    lens = None if plan.lens is None else asdict(plan.lens)
+    asked = [plan.tracker, plan.reference, plan.frame_rate_hz, lens, folder]
     text = json.dumps([reading_fingerprint(), asked, content.files], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()

@@ -23,6 +23,7 @@ from mtm_audit.decoding.together import decode_together
 from mtm_audit.ingest.films import film_length
 from mtm_audit.ingest.recording import read_recording
 from mtm_audit.ingest.source import Source, recordings_of, sources_of
+from mtm_audit.model.lens import Lens
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.recording import Recording
 from mtm_audit.model.stage import StageError, stage
@@ -43,11 +44,11 @@ EXIT_CODES = {"decoded": 0, "absent": 3, "inconclusive": 4}
 class DecodeOptions:
     """What the command line asked for; `plot` None draws nothing, `reading` is how to read logs.
 
-    `frame_rate_hz` replaces the times of films; `speed` is how many times as fast the recording is played, None to
-    search for it. `overlay` is what to draw over the film; `report` None writes no page. With `together` all recordings
-    show one message; `each_at` says when each was made, empty where the files do. `given` are the names of options that
-    were given and may not matter, see `unused_options`. `write_disclosed` is where to write the key that the public
-    channel carries.
+    `frame_rate_hz` replaces the times of films, and `lens` is that of their camera; `speed` is how many times as fast
+    the recording is played, None to search for it. `overlay` is what to draw over the film; `report` None writes no
+    page. With `together` all recordings show one message; `each_at` says when each was made, empty where the files do.
+    `given` are the names of options that were given and may not matter, see `unused_options`. `write_disclosed` is
+    where to write the key that the public channel carries.
     """
 
     paths: tuple[Path, ...]
@@ -60,6 +61,7 @@ class DecodeOptions:
     explain: bool
     reading: ReadOptions = field(default_factory=ReadOptions)
     frame_rate_hz: float | None = None
+    lens: Lens | None = None
     speed: float | None = 1.0
     report: ReportRequest | None = None
     force: bool = False
@@ -198,6 +200,7 @@ def _recorded(
             options=options.reading,
             frame_rate_hz=options.frame_rate_hz,
             reference=options.reference,
+            lens=options.lens,
         )
         unused = unused_options(options.given, kind, opened.key.scheme.schedule)
         recording = replace(recording, warnings=(*source.warnings, *unused, *recording.warnings))

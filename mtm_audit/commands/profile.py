@@ -12,6 +12,7 @@ from mtm_audit.detectors.base import Observation
 from mtm_audit.detectors.matched.learn import learn_profile
 from mtm_audit.detectors.matched.profile import PlantProfile, save_profile
 from mtm_audit.ingest.recording import read_recording, recording_files
+from mtm_audit.model.lens import Lens
 from mtm_audit.readers.logs.options import ReadOptions
 from mtm_audit.tracking.registry import tracker
 from mtm_onboard.protocol.errors import MtmError, command_line_values
@@ -21,7 +22,7 @@ from mtm_onboard.protocol.output_file import check_outputs
 
 @dataclass(frozen=True)
 class ProfileOptions:
-    """What the command line asked for; `settings` decode the recording first."""
+    """What the command line asked for; `settings` decode the recording first, `lens` is that of a film's camera."""
 
     paths: tuple[Path, ...]
     key: Path
@@ -32,6 +33,7 @@ class ProfileOptions:
     reading: ReadOptions = field(default_factory=ReadOptions)
     force: bool = False
     given: frozenset[str] = frozenset()
+    lens: Lens | None = None
 
 
 def run_profile(options: ProfileOptions) -> None:
@@ -41,7 +43,9 @@ def run_profile(options: ProfileOptions) -> None:
         tracker(options.tracker)
     key = load_key(options.key)
     files, kind = recording_files(options.paths)
-    recording = read_recording(files, kind, options.tracker, options=options.reading, reference=options.reference)
+    recording = read_recording(
+        files, kind, options.tracker, options=options.reading, reference=options.reference, lens=options.lens
+    )
     decoding = decode_tracks(recording.tracks, key, options.settings)
     if decoding.verdict != "decoded":
         raise MtmError(

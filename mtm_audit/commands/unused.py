@@ -3,8 +3,8 @@
 from mtm_audit.model.recording import Kind
 
 # By what they are for; all of them are named as a person gives them.
-OF_FILMS = frozenset({"--tracker", "--reference", "--frame-rate"})
-OF_LOGS = frozenset({"--topic", "--body", "--unit", "--time-unit", "--up", "--arrival-times"})
+OF_FILMS = frozenset({"--tracker", "--reference", "--frame-rate", "--camera"})
+OF_LOGS = frozenset({"--topic", "--body", "--unit", "--time-unit", "--up", "--heading-axis", "--arrival-times"})
 OF_ROLLING_KEYS = frozenset({"--at"})
 
 

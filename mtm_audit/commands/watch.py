@@ -26,6 +26,7 @@ from mtm_audit.live.sources import Source, source_of
 from mtm_audit.live.state import WatchState
 from mtm_audit.live.terminal import Board
 from mtm_audit.live.watching import Film, Gathering, Poses, Watch
+from mtm_audit.model.lens import Lens
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.recording import Kind, Recording
 from mtm_audit.reporting.remarks import remarks
@@ -42,7 +43,8 @@ if TYPE_CHECKING:
 class WatchOptions:
     """What the command line asked for; `page` is a port, 0 for any, None for no page; `seconds` None for no end.
 
-    `at_unix_s` is when the first thing was seen, give or take `at_error_s`; None takes now for a live source.
+    `at_unix_s` is when the first thing was seen, give or take `at_error_s`; None takes now for a live source. `lens` is
+    that of a camera's pictures.
     """
 
     source: str
@@ -55,6 +57,7 @@ class WatchOptions:
     seconds: float | None
     page: int | None
     record: Path | None
+    lens: Lens | None = None
 
 
 @dataclass
@@ -85,7 +88,7 @@ def run_watch(options: WatchOptions) -> int:
     opened = opened_key(options.key, options.settings.revoked)
     source = source_of(options.source)
     served = None if options.page is None else _page_class()
-    film = Film(following(options.tracker), options.reference) if source.is_film else None
+    film = Film(following(options.tracker), options.reference, options.lens) if source.is_film else None
     gathering: Gathering = film or Poses()
     wall = _wall(options, source, opened)
     state = WatchState(source.shown, opened.key, options.settings.threshold)

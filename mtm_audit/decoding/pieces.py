@@ -81,4 +81,5 @@ def part_of_track(track: Track, begin_s: float, end_s: float) -> Track:
         positions=track.positions[at],
         valid=track.valid[at],
         headings_rad=headings_rad,
+        corners=None if track.corners is None else track.corners[at],
     )

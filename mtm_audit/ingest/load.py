@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from mtm_audit.model.lens import Lens
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.pictured import Pictured
 from mtm_audit.model.track import Track
@@ -42,17 +43,19 @@ def load_tracks(
     warn: Callable[[str], None] | None = None,
     progress: Callable[[int], None] | None = None,
     reference: Sequence[str] = (),
+    lens: Lens | None = None,
 ) -> list[Track]:
     """Read one recording: a video through the named tracker, or a log or motion-capture file as it is.
 
-    The camera's own motion is taken out, by the tracks that `reference` names or by what is found to stand still.
-    `warn` receives one sentence for each thing that is wrong but leaves something to use; `progress` the number of
-    frames tracked so far. Raises MtmError when the recording cannot be used.
+    What the `lens` of a film distorts is straightened. The camera's own motion is taken out, by the tracks that
+    `reference` names or by what is found to stand still. `warn` receives one sentence for each thing that is wrong but
+    leaves something to use; `progress` the number of frames tracked so far. Raises MtmError when the recording cannot
+    be used.
     """
     if not is_video(path):
         return list(read_log(path, warn=warn).tracks)
     pixels = tracker(tracker_name).pixels
-    return tracked(read_frames(path, pixels, warn), tracker_name, reference, warn, progress)
+    return tracked(read_frames(path, pixels, warn), tracker_name, reference, warn, progress, lens=lens)
 
 
 def tracked(
@@ -62,13 +65,25 @@ def tracked(
     warn: Callable[[str], None] | None = None,
     progress: Callable[[int], None] | None = None,
     keep: Callable[[Pictured], None] | None = None,
+    lens: Lens | None = None,
 ) -> list[Track]:
-    """The tracks in frames, the camera's own motion taken out; `keep` receives them with it. See `load_tracks`."""
+    """The tracks in frames, the camera's own motion taken out; `keep` receives them with it. See `load_tracks`.
+
+    What the `lens` distorts is straightened, and markers are told as seen from above; raises MtmError when the lens is
+    of pictures of another size.
+    """
+    from mtm_audit.tracking.ground_plane import from_above
     from mtm_audit.tracking.stabilise import stabilised_tracks, unstabilised_tracks
 
     chosen = tracker(tracker_name, warn)
     if tracker_name.partition(":")[0] in _NO_CAMERA:
         if reference:
             raise MtmError(f"the tracker {tracker_name} measures nothing against a reference; leave out --reference")
+        if lens is not None:
+            raise MtmError(f"the tracker {tracker_name} reads what no lens showed; leave out --camera")
         return unstabilised_tracks(chosen, frames, progress, keep)
-    return stabilised_tracks(chosen, frames, reference, warn, progress, keep)
+    kept: list[Pictured] = []
+    tracks = stabilised_tracks(chosen, frames, reference, warn, progress, kept.append, lens)
+    if keep is not None:
+        keep(kept[0])
+    return from_above(tracks, kept[0].size, lens, warn, flipped=kept[0].flipped)

@@ -7,6 +7,7 @@ from mtm_audit.ingest.films import film_frames, is_picture
 from mtm_audit.ingest.load import tracked
 from mtm_audit.ingest.logs import read_logs
 from mtm_audit.ingest.source import sources_of
+from mtm_audit.model.lens import Lens
 from mtm_audit.model.pictured import Pictured
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.recording import Kind, Recording
@@ -41,17 +42,19 @@ def read_recording(
     options: ReadOptions | None = None,
     frame_rate_hz: float | None = None,
     reference: Sequence[str] = (),
+    lens: Lens | None = None,
 ) -> Recording:
     """Read the files into tracks; `progress` receives the number of frames tracked so far, `options` are of logs.
 
     `frame_rate_hz` replaces the times of a film by even ones, and `reference` names tracks of a film that stand still;
-    the camera's own motion is taken out. Raises MtmError when a file cannot be used, or when two files are of one body.
+    what the film's `lens` distorts is straightened, and the camera's own motion is taken out. Raises MtmError when a
+    file cannot be used, or when two files are of one body.
     """
     warnings: list[str] = []
     kept: list[Pictured] = []
     if kind == "video":
         frames = film_frames(files, tracker_named(tracker).pixels, warnings.append, frame_rate_hz)
-        tracks = tracked(frames, tracker, reference, warnings.append, progress, kept.append)
+        tracks = tracked(frames, tracker, reference, warnings.append, progress, kept.append, lens)
         at = _created_at(files, tracks)
     else:
         contents = read_logs(files, options or ReadOptions(), warnings.append)

@@ -18,9 +18,11 @@ from mtm_audit.decoding.start import start_of
 from mtm_audit.decoding.views import view_strengths
 from mtm_audit.detectors import make_detector
 from mtm_audit.live.looks import Look
+from mtm_audit.model.lens import Lens
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.track import Track
 from mtm_audit.tracking.background import BackgroundFollower
+from mtm_audit.tracking.ground_plane import from_above
 from mtm_audit.tracking.stabilise import without_camera
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.key import Key
@@ -36,7 +38,7 @@ class Seen:
     """What a watch had seen when it was looked at; `background` tells how the camera moved, None without one.
 
     Tracks of mirrored pictures are `flipped`, and `reference` names those that stand still. `at` is when the watch's
-    own clock stood at zero, None where the settings of the decode say so.
+    own clock stood at zero, None where the settings of the decode say so. `lens` is what showed the tracks.
     """
 
     tracks: tuple[Track, ...]
@@ -44,6 +46,7 @@ class Seen:
     flipped: bool = False
     reference: tuple[str, ...] = ()
     at: RecordedAt | None = None
+    lens: Lens | None = None
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,8 @@ def _judged(look: Look, seen: Seen, key: Key, settings: DecodeSettings) -> Judge
     tracks = list(seen.tracks)
     try:
         if seen.background is not None:
-            tracks = without_camera(tracks, seen.background, seen.reference, seen.flipped, warnings.append)
+            tracks = without_camera(tracks, seen.background, seen.reference, seen.flipped, warnings.append, seen.lens)
+            tracks = from_above(tracks, seen.background.size, seen.lens, warnings.append, flipped=seen.flipped)
         if look.number % WHOLE_EVERY and not _is_worth_looking(look, tracks, key, settings):
             return Judged(look, None, tuple(tracks), None, tuple(warnings))
         decoding = paid_for(decode_tracks(tracks, key, settings), look.choices)

@@ -11,10 +11,12 @@ from mtm_audit.live.judges import Judge
 from mtm_audit.live.judging import Judged, Seen
 from mtm_audit.live.looks import Look, Looks, final_look
 from mtm_audit.live.poses import PoseTracks
+from mtm_audit.model.lens import Lens
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.tracking.background import BackgroundFollower
 from mtm_audit.tracking.following import Following
+from mtm_audit.tracking.lens import check_fits
 from mtm_onboard.protocol.scheme import Scheme
 
 # How much more than is looked at may be kept, before what is too old is dropped.
@@ -64,14 +66,17 @@ class Film:
 
     following: Following
     reference: tuple[str, ...] = ()
+    lens: Lens | None = None
     background: BackgroundFollower = field(init=False)
 
     def __post_init__(self) -> None:
         self.background = BackgroundFollower(is_needed=not self.reference)
 
     def put(self, event: Frame | Pose) -> None:
-        """Track in the next frame; raises MtmError when the size of the picture changes."""
+        """Track in the next frame; raises MtmError when the size of the picture changes, or is not the lens'."""
         assert isinstance(event, Frame)
+        if self.lens is not None:
+            check_fits(event, self.lens)
         self.following.look(event)
         self.background.look(event)
 
@@ -79,7 +84,7 @@ class Film:
         """The tracks, and the background that goes with them frame by frame."""
         self.forget(begin_s)
         tracks = tuple(part_of_track(track, begin_s, end_s) for track in self.following.tracks())
-        return Seen(tracks, self.background.until(end_s), self.following.flipped, self.reference)
+        return Seen(tracks, self.background.until(end_s), self.following.flipped, self.reference, lens=self.lens)
 
     def forget(self, before_s: float) -> None:
         """Drop what was seen before then."""

@@ -23,8 +23,10 @@ class Track:
     `times_s` (n,) strictly increasing, the recording's own clock; `positions` (n, axes) in `unit` ("m", "px",
     "rad"), NaN where not observed; `valid` (n,) False where not observed. `axes` name the columns ("x", "y").
     `headings_rad` (n,), counter-clockwise from +x in the frame of `positions`, where the tracker knows it (NaN
-    where it does not). `extent_px` is how large the body is in the picture, where a tracker knows it. An occluded body
-    is missing data, never zeros. Raises MtmError when the arrays disagree.
+    where it does not); `heading_axis` the axis of a body in three dimensions whose direction they are. `extent_px` is
+    how large the body is in the picture, where a tracker knows it, and `corners` (n, 4, 2) are those of a square marker
+    on it, in order, where it is seen by one. An occluded body is missing data, never zeros.
+    Raises MtmError when the arrays disagree.
     """
 
     name: str
@@ -34,7 +36,9 @@ class Track:
     axes: tuple[str, ...] = ("x", "y")
     unit: str = "m"
     headings_rad: Floats | None = None
+    heading_axis: str | None = None
     extent_px: float | None = None
+    corners: Floats | None = None
 
     def __post_init__(self) -> None:
         count = len(self.times_s)
@@ -42,6 +46,8 @@ class Track:
             raise MtmError(f"track {self.name!r}: times, positions and validity differ in length; record it anew")
         if self.headings_rad is not None and self.headings_rad.shape != (count,):
             raise MtmError(f"track {self.name!r}: times and headings differ in length; record it anew")
+        if self.corners is not None and self.corners.shape != (count, 4, 2):
+            raise MtmError(f"track {self.name!r}: times and corners differ in length; record it anew")
         if count and not np.all(np.isfinite(self.times_s)):
             raise MtmError(f"track {self.name!r} has times that are not numbers; remove those lines")
         if np.any(np.diff(self.times_s) <= 0):

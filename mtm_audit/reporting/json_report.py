@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -24,6 +25,7 @@ _NO_BASIS = Basis()
 def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, ...], basis: Basis = _NO_BASIS) -> str:
     """The whole answer as one JSON object with a newline at its end; numbers are finite, nothing in it is secret."""
     evidence, scheme = decoding.evidence, decoding.scheme
+    heading_axes = {track.name: track.heading_axis for track in recording.tracks}
     report = {
         "schema_version": SCHEMA_VERSION,
         "program": {"name": "mtm-audit", "version": version(DISTRIBUTION)},
@@ -42,7 +44,7 @@ def json_report(recording: Recording, decoding: Decoding, warnings: tuple[str, .
         "scheme": {"name": scheme.name, "fingerprint": scheme.fingerprint},
         "detector": decoding.settings.detector,
         "reference_frame": decoding.frame,
-        "channels": [_channel(channel) for channel in decoding.channels],
+        "channels": [_channel(channel, heading_axes) for channel in decoding.channels],
         "recording": {
             "paths": [str(path) for path in recording.paths],
             "kind": recording.kind,
@@ -116,12 +118,13 @@ def _bits(nats: float | None) -> float | None:
     return None if nats is None else nats / math.log(2.0)
 
 
-def _channel(decoding: ChannelDecoding) -> dict[str, Any]:
+def _channel(decoding: ChannelDecoding, heading_axes: Mapping[str, str | None]) -> dict[str, Any]:
     channel, glimpse, reading = decoding.channel, decoding.glimpse, decoding.reading
     return {
         "name": channel.name,
         "body": channel.body,
         "track": None if glimpse is None else glimpse.name,
+        "heading_axis": None if glimpse is None else heading_axes.get(glimpse.name),
         "track_searched": decoding.searched,
         "track_exchanged": decoding.exchanged,
         "state": decoding.state,

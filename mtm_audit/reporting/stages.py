@@ -8,6 +8,7 @@ import numpy as np
 
 from mtm_audit.decoding.decoding import ChannelDecoding, Decoding
 from mtm_audit.model.recording import Recording
+from mtm_audit.model.track import Track
 from mtm_audit.reporting.delivery import frame_sentences
 from mtm_audit.reporting.text import (
     chance_sentence,
@@ -56,7 +57,7 @@ def stages_of_recording(recording: Recording) -> list[Stage]:
     """Recording and tracks."""
     tracks = tuple(
         f"{track.name}: seen in {int(track.valid.sum())} of {len(track.times_s)} {_observations(recording)}, positions "
-        f"in {track.unit}"
+        f"in {track.unit}{_heading_of(track)}"
         for track in recording.tracks
     )
     return [Stage("recording", (recording_line(recording), *recording.warnings)), Stage("tracks", tracks)]
@@ -80,6 +81,10 @@ def stages_of_decoding(decoding: Decoding) -> list[Stage]:
         Stage("verdict", (verdict_sentence(decoding), chance_sentence(decoding))),
     ]
     return stages
+
+
+def _heading_of(track: Track) -> str:
+    return "" if track.heading_axis is None else f", heading of its {track.heading_axis} axis"
 
 
 def _observations(recording: Recording) -> str:

@@ -104,12 +104,22 @@ def search_sentence(recording: Recording, decoding: Decoding) -> str | None:
     return f"Tracks matched by search {among}: {pairs}."
 
 
-def frame_sentence(decoding: Decoding) -> str | None:
+def frame_sentence(recording: Recording, decoding: Decoding) -> str | None:
     """Along whose axes a message was read; None for the world's, and where nothing was read."""
     if decoding.verdict == "absent" or decoding.frame == "world":
         return None
-    headings = "as their paths show them" if decoding.frame == "path" else "as recorded"
+    headings = "as their paths show them" if decoding.frame == "path" else f"as recorded{_axes_ahead(recording)}"
     return f"Read along the robots' own axes, by headings {headings}; trying that is paid for."
+
+
+def _axes_ahead(recording: Recording) -> str:
+    """Which axes of bodies the headings are of, in brackets; empty where the recording has headings as such."""
+    ahead: dict[str, list[str]] = {}
+    for track in recording.tracks:
+        if track.heading_axis is not None:
+            ahead.setdefault(track.heading_axis, []).append(track.name)
+    said = ", ".join(f"the {axis} axis of {', '.join(names)}" for axis, names in ahead.items())
+    return f" ({said})" if said else ""
 
 
 def piece_sentence(decoding: Decoding) -> str | None:
@@ -149,7 +159,7 @@ def rests_on(recording: Recording, decoding: Decoding, basis: Basis = _NO_BASIS)
         *basis.sentences,
         clock_sentence(decoding),
         search_sentence(recording, decoding),
-        frame_sentence(decoding),
+        frame_sentence(recording, decoding),
         piece_sentence(decoding),
         together_sentence(recording, decoding),
     )

@@ -21,7 +21,8 @@ _MOST_TOPICS = 12  # that are read to tell what is in them
 class Body:
     """One body of a log: when it was observed, in which unit and axes, and how far it went along the widest axis.
 
-    `seen` and `headings` are the shares of its rows with a position and with a heading.
+    `seen` and `headings` are the shares of its rows with a position and with a heading, which is that of the body's
+    `heading_axis` where it is turned in three dimensions.
     """
 
     name: str
@@ -30,6 +31,7 @@ class Body:
     axes: tuple[str, ...]
     seen: float
     headings: float
+    heading_axis: str | None
     travel: float
 
 
@@ -109,5 +111,6 @@ def _body(track: Track) -> Body:
         axes=track.axes,
         seen=float(np.mean(track.valid)),
         headings=0.0 if headings is None else float(np.mean(np.isfinite(headings))),
+        heading_axis=track.heading_axis,
         travel=float(np.ptp(seen, axis=0).max()) if len(seen) else 0.0,
     )

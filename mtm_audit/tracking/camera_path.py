@@ -1,6 +1,6 @@
 """How the camera moved: what brings each picture onto one of them, and tracks as that one would show them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,16 +46,26 @@ class CameraPath:
 
     def applied(self, track: Track) -> Track:
         """The track as a camera that stood still would have shown it, headings too; not valid where that is unknown."""
-        positions = moved(self.to_reference, track.positions)
-        valid = track.valid & np.isfinite(positions[:, 0])
-        positions = np.where(valid[:, None], positions, np.nan)
-        headings = track.headings_rad
-        if headings is not None:
-            # A small step along the heading, carried over with the position, points where the heading does afterwards.
-            ahead = track.positions + np.stack([np.cos(headings), np.sin(headings)], axis=1)
-            steps = moved(self.to_reference, ahead) - positions
-            headings = np.arctan2(steps[:, 1], steps[:, 0])
-        return replace(track, positions=positions, valid=valid, headings_rad=headings)
+        return moved_track(track, self._moved)
+
+    def _moved(self, places: Floats) -> Floats:
+        """Places (frames, ..., 2), each under the homography of its frame."""
+        between = (1,) * (places.ndim - 2)
+        return moved(self.to_reference.reshape(-1, *between, 3, 3), places)
+
+
+def moved_track(track: Track, move: Callable[[Floats], Floats]) -> Track:
+    """The track with `move` applied to its places (n, ..., 2), headings too; not valid where that gives NaN."""
+    positions = move(track.positions)
+    valid = track.valid & np.isfinite(positions[:, 0])
+    positions = np.where(valid[:, None], positions, np.nan)
+    headings = track.headings_rad
+    if headings is not None:
+        # A small step along the heading, carried over with the position, points where the heading does afterwards.
+        steps = move(track.positions + np.stack([np.cos(headings), np.sin(headings)], axis=1)) - positions
+        headings = np.arctan2(steps[:, 1], steps[:, 0])
+    corners = None if track.corners is None else move(track.corners)
+    return replace(track, positions=positions, valid=valid, headings_rad=headings, corners=corners)
 
 
 def moved(homographies: Floats, points: Floats) -> Floats:

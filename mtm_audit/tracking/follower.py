@@ -9,7 +9,7 @@ import numpy as np
 from mtm_audit.model.picture import Frame, Image
 from mtm_audit.model.track import Floats, Track
 from mtm_audit.tracking.dictionaries import reads_in_a_mirror
-from mtm_audit.tracking.gather import Gather
+from mtm_audit.tracking.gather import Gather, Place
 from mtm_audit.tracking.markers import MarkerFinder, Sighting
 
 READ_EVERY_S = 0.25  # after which a marker's number is read again
@@ -28,7 +28,7 @@ _COPIES = "bcdefghijklmnopqrstuvwxyz"
 # A marker's number, and which of its copies: 0, 1 and so on in the order of their appearance.
 Copy = tuple[int, int]
 # Where the copies were seen, by their keys and the numbers of frames.
-Seen = dict[str, dict[int, tuple[float, float, float]]]
+Seen = dict[str, dict[int, Place]]
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ class MarkerFollower:
         column, row = sighting.centre
         # A robot's body reaches beyond its marker, and its shadow beyond that.
         extent_px = BODY_SIDES * sighting.side_px
-        self._gather.put(_key(copy), float(column), float(row), sighting.heading_rad, extent_px)
+        self._gather.put(_key(copy), float(column), float(row), sighting.heading_rad, extent_px, sighting.corners)
         last = self._followed.get(copy)
         is_next = last is not None and last.seen_s == self._last_s
         step = sighting.corners - last.sighting.corners if last is not None and is_next else np.zeros((4, 2))
@@ -211,7 +211,7 @@ class MarkerFollower:
                     break
 
 
-def _reach_px(places: Mapping[int, tuple[float, float, float]]) -> float:
+def _reach_px(places: Mapping[int, Place]) -> float:
     return float(np.ptp(np.array(list(places.values()))[:, :2], axis=0).max())
 
 

@@ -7,22 +7,25 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mtm_audit.model.picture import Frame
-from mtm_audit.model.track import Track
+from mtm_audit.model.track import Floats, Track
 from mtm_onboard.protocol.errors import MtmError
 
 Progress = Callable[[int], None]
+Place = tuple[float, ...]
 
 
 @dataclass
 class Gather:
     """Observations in pixels, x to the right and y up, as (x, y, heading) under a name; one row per frame.
 
+    The corners of a marker follow the heading, x and y of each in turn.
+
     A body that is not put in between two calls of `next_frame` was not seen in that frame.
     """
 
     height_px: int = 0
     times_s: list[float] = field(default_factory=list)
-    seen: dict[str, dict[int, tuple[float, float, float]]] = field(default_factory=dict)
+    seen: dict[str, dict[int, Place]] = field(default_factory=dict)
     extents_px: dict[str, float] = field(default_factory=dict)
 
     def next_frame(self, frame: Frame) -> None:
@@ -30,13 +33,27 @@ class Gather:
         self.height_px = frame.size[1]
         self.times_s.append(frame.time_s)
 
-    def put(self, name: str, column: float, row: float, heading_rad: float = np.nan, extent_px: float = 0.0) -> None:
+    def put(
+        self,
+        name: str,
+        column: float,
+        row: float,
+        heading_rad: float = np.nan,
+        extent_px: float = 0.0,
+        corners: Floats | None = None,
+    ) -> None:
         """Note where a body is in the current frame: picture coordinates (y down), heading counter-clockwise.
 
-        `extent_px` is how large it is, 0 where that is not known; the largest of a film counts.
+        `extent_px` is how large it is, 0 where that is not known; the largest of a film counts. `corners` (4, 2) are
+        those of a marker, columns and rows.
         """
         self.extents_px[name] = max(extent_px, self.extents_px.get(name, 0.0))
-        self.seen.setdefault(name, {})[len(self.times_s) - 1] = (column, self.height_px - 1 - row, heading_rad)
+        self.seen.setdefault(name, {})[len(self.times_s) - 1] = (
+            column,
+            self.height_px - 1 - row,
+            heading_rad,
+            *(() if corners is None else np.ravel([0.0, self.height_px - 1] + corners * [1.0, -1.0]).tolist()),
+        )
 
     def latest(self) -> dict[str, tuple[float, float]]:
         """Column and row (y down) of each body that was seen in the current frame."""
@@ -60,13 +77,24 @@ class Gather:
         times_s = np.asarray(self.times_s, dtype=np.float64)
         found = []
         for name in sorted(self.seen):
-            table = np.full((len(times_s), 3), np.nan)
-            table[list(self.seen[name])] = list(self.seen[name].values())
+            places = list(self.seen[name].values())
+            table = np.full((len(times_s), len(places[0])), np.nan)
+            table[list(self.seen[name])] = places
             valid = np.asarray(np.isfinite(table[:, 0]))
             headings = table[:, 2] if with_headings else None
+            corners = table[:, 3:].reshape(-1, 4, 2) if table.shape[1] > 3 else None
             extent_px = self.extents_px.get(name) or None
             found.append(
-                Track(name, times_s, table[:, :2], valid, unit="px", headings_rad=headings, extent_px=extent_px)
+                Track(
+                    name=name,
+                    times_s=times_s,
+                    positions=table[:, :2],
+                    valid=valid,
+                    unit="px",
+                    headings_rad=headings,
+                    extent_px=extent_px,
+                    corners=corners,
+                )
             )
         return found
 

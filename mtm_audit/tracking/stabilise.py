@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
+from mtm_audit.model.lens import Lens
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.pictured import Pictured
 from mtm_audit.model.track import Floats, Track
@@ -11,6 +12,7 @@ from mtm_audit.tracking.background import BackgroundFollower
 from mtm_audit.tracking.background_path import background_path
 from mtm_audit.tracking.camera_path import CameraPath
 from mtm_audit.tracking.gather import Progress
+from mtm_audit.tracking.lens import check_fits, straightened_background, straightened_track
 from mtm_audit.tracking.reference import FOR_HOMOGRAPHY, chosen_tracks, reference_path, still_tracks
 from mtm_audit.tracking.registry import Tracker, in_picture, is_flipped
 
@@ -28,20 +30,22 @@ def stabilised_tracks(
     warn: Callable[[str], None] | None = None,
     progress: Progress | None = None,
     keep: Callable[[Pictured], None] | None = None,
+    lens: Lens | None = None,
 ) -> list[Track]:
     """The tracker's tracks as a camera that stood still would have shown them; `warn` hears what was taken out.
 
-    `keep` receives them as the pictures show them.
+    `keep` receives them as the pictures show them. What the `lens` distorts is straightened first.
 
     `reference` names tracks that stand still. Without any, those that keep their distances are the reference when
     there are enough of them, and otherwise what is behind the robots. The motion of a camera that moved by no more
-    than can be told is left alone. Raises MtmError as the tracker does, and when a reference does not exist.
+    than can be told is left alone. Raises MtmError as the tracker does, and when a reference does not exist,
+    or the lens is of pictures of another size.
     """
     seen = BackgroundFollower(is_needed=not reference)
-    tracks = tracker.track(_looked_at(frames, seen), progress)
+    tracks = tracker.track(_looked_at(frames, seen, lens), progress)
     if keep is not None:
         keep(Pictured(tuple(tracks), seen.size, is_flipped(tracker)))
-    return without_camera(tracks, seen, reference, is_flipped(tracker), warn)
+    return without_camera(tracks, seen, reference, is_flipped(tracker), warn, lens)
 
 
 def without_camera(
@@ -50,6 +54,7 @@ def without_camera(
     reference: Sequence[str] = (),
     flipped: bool = False,
     warn: Callable[[str], None] | None = None,
+    lens: Lens | None = None,
 ) -> list[Track]:
     """Tracks with the camera's own motion taken out, as far as the background `seen` beside them tells it.
 
@@ -57,14 +62,27 @@ def without_camera(
     """
     if any(track.unit != "px" for track in tracks):
         return tracks
-    path = _path(seen, tracks, reference, flipped, warn or (lambda sentence: None))
+    told = warn or (lambda sentence: None)
+    if lens is not None:
+        tracks, seen = _straightened(tracks, lens, flipped, told), straightened_background(seen, lens)
+    path = _path(seen, tracks, reference, flipped, told)
     if path is None or path.is_still(tracks):
         return tracks
-    if warn is not None:
-        warn(f"the camera moved by {path.motion_px(tracks):.2g} px rms; that was taken out by {path.source}")
-        if path.known < 1.0:
-            warn(_unknown(path, tracks[0].times_s))
+    told(f"the camera moved by {path.motion_px(tracks):.2g} px rms; that was taken out by {path.source}")
+    if path.known < 1.0:
+        told(_unknown(path, tracks[0].times_s))
     return [path.applied(track) for track in tracks]
+
+
+def _straightened(tracks: list[Track], lens: Lens, flipped: bool, warn: Callable[[str], None]) -> list[Track]:
+    straight = [straightened_track(track, lens, flipped=flipped) for track in tracks]
+    seen, reached = (sum(int(track.valid.sum()) for track in some) for some in (tracks, straight))
+    if reached < seen:
+        warn(
+            f"{lens.name} does not reach {1.0 - reached / seen:.1%} of the places that were seen, so that they are "
+            "left out; calibrate with a board that reaches the picture's corners"
+        )
+    return straight
 
 
 def unstabilised_tracks(
@@ -125,7 +143,9 @@ def _rms_px(track: Track) -> float:
     return float(np.sqrt(np.mean(np.var(seen, axis=0)))) if len(seen) else np.inf
 
 
-def _looked_at(frames: Iterable[Frame], seen: BackgroundFollower) -> Iterator[Frame]:
+def _looked_at(frames: Iterable[Frame], seen: BackgroundFollower, lens: Lens | None = None) -> Iterator[Frame]:
     for frame in frames:
+        if lens is not None:
+            check_fits(frame, lens)
         seen.look(frame)
         yield frame

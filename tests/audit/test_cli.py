@@ -21,8 +21,10 @@ from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.picture import Frame
 from mtm_onboard.protocol import save_key
 from tests.audit.moving_robot import FAKE_SECRET, OTHER_SECRET, key_of, robot_track, scheme_of
+from tests.audit.readers.calibrations import camera_info
 from tests.audit.readers.log_writers import write_rosbag2
 from tests.audit.readers.moving_pose import driving
+from tests.audit.small_films import SIZE, film, marker
 from tests.patience import PATIENCE_S
 
 KEY = key_of(scheme_of(symbols=(1, 1), ticks=400))
@@ -446,11 +448,25 @@ def test_options_of_logs_reach_the_reader(audit, tmp_path):
         ("--unit", "parsec", "'parsec' is no unit of length; give one of m, dm, cm"),
         ("--time-unit", "days", "'days' is no unit of time; give one of s, ms"),
         ("--up", "w", "'w' is no axis; give one of x, y, z"),
+        ("--heading-axis", "+x", "'+x' is no axis of a body; give one of x, y, z, -x, -y, -z"),
         ("--body", "rover", "'rover' is not NAME=MARKER,MARKER"),
     ],
 )
 def test_options_of_logs_that_mean_nothing_are_refused(audit, folder, option, value, words):
     refused(audit(folder / "sent", option, value), words, code=2)
+
+
+def test_a_calibration_that_does_not_fit_is_told(audit, folder, tmp_path):
+    calibration = tmp_path / "cam0.yaml"
+    refused(audit(folder / "sent", "--camera", calibration), f"cannot read the calibration {calibration}")
+    calibration.write_text(camera_info())
+    code, out, _ = audit(folder / "sent", "--camera", calibration, "--json")
+    assert code == 0
+    assert "--camera was not used: the recording is motion capture or a log, and no film" in json.loads(out)["warnings"]
+    path = film(tmp_path / "film.mp4", [(marker(), (100, 100), True)], seconds=0.5)
+    words = f"{calibration} is of pictures of 752 x 480, and the film's are of {SIZE[0]} x {SIZE[1]}"
+    refused(audit(path, "--camera", calibration), words)
+    refused(audit(path, "--camera", calibration, "--tracker", "brightness"), "what no lens showed; leave out --camera")
 
 
 def test_a_topic_is_chosen_on_the_command_line(audit, tmp_path):

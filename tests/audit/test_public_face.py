@@ -9,8 +9,8 @@ import mtm_audit
 from tests.audit.moving_robot import key_of, robot_track, scheme_of
 
 NAMES = [
-    "ChannelDecoding", "DecodeSettings", "Decoding", "Evidence", "Key", "MtmError", "ReadOptions", "RecordedAt",
-    "Track", "decode", "decode_tracks", "load_key",
+    "ChannelDecoding", "DecodeSettings", "Decoding", "Evidence", "Key", "Lens", "MtmError", "ReadOptions",
+    "RecordedAt", "Track", "decode", "decode_tracks", "load_key", "read_lens",
 ]  # fmt: skip
 
 

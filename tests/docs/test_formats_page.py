@@ -27,5 +27,5 @@ def test_every_format_has_a_row():
 
 def test_every_option_of_the_page_is_one_of_decode():
     named = set(re.findall(r"`(--[a-z-]+)", PAGE))
-    assert {"--topic", "--body", "--unit", "--time-unit", "--up", "--arrival-times"} <= named
+    assert {"--topic", "--body", "--unit", "--time-unit", "--up", "--heading-axis", "--arrival-times"} <= named
     assert named - options_of("mtm-audit", ("decode",)) == set()

@@ -13,7 +13,7 @@ import numpy as np
 
 from hil.experiments.runs.cells import Cell, Scalar, Values
 from hil.fleet.lockstep import run_lockstep
-from hil.fleet.rig import RunSettings
+from hil.fleet.rig import RunResult, RunSettings
 from hil.sensors.camera import film
 from hil.sensors.camera_motion import CameraMotion
 from hil.sensors.cameras import CAMERAS, FLOORS
@@ -26,7 +26,7 @@ from mtm_onboard.protocol import Key
 
 MESSAGE_TICKS, LEAD_S, TAIL_S = 400, 1.0, 0.5
 FRAME_RATE_HZ = 25.0
-_STREAM = 9
+STREAM = 9
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,7 @@ def camera_cells(rollouts: int, seed: int) -> list[list[Cell]]:
 def film_and_decode(parameters: Values, seed: int) -> dict[str, Scalar]:
     """Evidence in `bits` of one film, whether its message was `right`, and the share of frames in which robots show."""
     condition = Condition(**parameters)  # type: ignore[arg-type]
-    draw = np.random.default_rng([_STREAM, seed])
-    key = Key("cameras", draw.bytes(32), fleet_scheme(MESSAGE_TICKS))
-    symbols = tuple(int(symbol) for symbol in draw.integers(0, key.scheme.alphabet_size, key.scheme.message_symbols))
-    seconds = LEAD_S + MESSAGE_TICKS / key.scheme.rate_hz + TAIL_S
-    run = run_lockstep(RunSettings(key=key, symbols=symbols, seconds=seconds, seed=seed, wire="direct", start_s=LEAD_S))
+    key, symbols, run = sent_run(seed)
     overhead = CAMERAS["overhead"]
     motion = CameraMotion(
         shake_px=condition.shake_px,
@@ -78,7 +74,7 @@ def film_and_decode(parameters: Values, seed: int) -> dict[str, Scalar]:
     )
     with TemporaryDirectory() as folder:
         path = Path(folder) / "film.mp4"
-        frames = film(camera, FLOORS[condition.floor], list(run.trajectories), np.random.default_rng([_STREAM, seed]))
+        frames = film(camera, FLOORS[condition.floor], list(run.trajectories), np.random.default_rng([STREAM, seed]))
         write_video(frames, path, FRAME_RATE_HZ)
         tracks = load_tracks(path)
     decoding = decode_tracks(tracks, key, DecodeSettings())
@@ -88,6 +84,16 @@ def film_and_decode(parameters: Values, seed: int) -> dict[str, Scalar]:
         "right": decoding.verdict == "decoded" and decoding.symbols == symbols,
         "seen": float(np.mean([track.valid.mean() for track in robots])),
     }
+
+
+def sent_run(seed: int) -> tuple[Key, tuple[int, ...], RunResult]:
+    """The key, the symbols and the run of a seed, which all conditions film."""
+    draw = np.random.default_rng([STREAM, seed])
+    key = Key("cameras", draw.bytes(32), fleet_scheme(MESSAGE_TICKS))
+    symbols = tuple(int(symbol) for symbol in draw.integers(0, key.scheme.alphabet_size, key.scheme.message_symbols))
+    seconds = LEAD_S + MESSAGE_TICKS / key.scheme.rate_hz + TAIL_S
+    settings = RunSettings(key=key, symbols=symbols, seconds=seconds, seed=seed, wire="direct", start_s=LEAD_S)
+    return key, symbols, run_lockstep(settings)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from mtm_audit.model.track import Floats
 from mtm_audit.readers.logs.body import Log, Warn
 from mtm_audit.readers.logs.libraries import foreign, missing
 from mtm_audit.readers.logs.opening import Opening
-from mtm_audit.readers.logs.options import METRES, UP_AXES, ReadOptions
+from mtm_audit.readers.logs.options import AXES, METRES, ReadOptions
 from mtm_audit.readers.logs.rigid import grouped, rigid_body
 from mtm_onboard.protocol.errors import MtmError
 
@@ -59,7 +59,7 @@ def read_c3d(path: Path, options: ReadOptions, warn: Warn) -> Log:
     unit_m = options.metres(markers.unit if markers.unit in METRES else None)
     markers_m = np.moveaxis(markers.points[:3], 0, -1).swapaxes(0, 1) * unit_m
     markers_m[(markers.residuals.T < 0.0) | ~np.all(np.isfinite(markers_m), axis=2)] = np.nan
-    up = options.up or (markers.up if markers.up in UP_AXES else "z")
+    up = options.up or (markers.up if markers.up in AXES else "z")
     times_s = np.arange(frames) / markers.rate_hz
     bodies = [
         rigid_body(name, times_s, markers_m[:, members], up, str(path), warn)

@@ -7,7 +7,7 @@ import numpy as np
 
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.model.track import Floats
-from mtm_audit.readers.logs.body import Body, Log, Warn
+from mtm_audit.readers.logs.body import Body, Log, Warn, chosen_axis
 from mtm_audit.readers.logs.boot_clock import booted_at
 from mtm_audit.readers.logs.choosing import check_topics
 from mtm_audit.readers.logs.libraries import foreign, library
@@ -42,7 +42,7 @@ def read_ulog(path: Path, options: ReadOptions, warn: Warn) -> Log:
             warn(f"{path} is {WHAT} with damaged parts, which were left out")
         data = {(item.name, item.multi_id): item.data for item in log.data_list if len(item.data["timestamp"])}
         chosen = _chosen(path, data, options, warn)
-        bodies = [_body(path, name, data, key, options) for name, key in chosen.items()]
+        bodies = [_body(path, name, data, key, options, warn) for name, key in chosen.items()]
         return Log(tuple(bodies), at=_booted_at(data))
 
 
@@ -68,7 +68,9 @@ def _name(key: tuple[str, int]) -> str:
     return key[0] if key[1] == 0 else f"{key[0]}.{key[1]}"
 
 
-def _body(path: Path, name: str, data: dict[tuple[str, int], Any], key: tuple[str, int], options: ReadOptions) -> Body:
+def _body(
+    path: Path, name: str, data: dict[tuple[str, int], Any], key: tuple[str, int], options: ReadOptions, warn: Warn
+) -> Body:
     fields = data[key]
     fields_xyz = ("x", "y", "z") if "x" in fields else ("position[0]", "position[1]", "position[2]")
     if not set(fields_xyz) <= fields.keys():
@@ -83,20 +85,30 @@ def _body(path: Path, name: str, data: dict[tuple[str, int], Any], key: tuple[st
     up = options.up or "-z"
     if "q[0]" in fields:
         return Body(name, times_s, positions_m, quaternions_xyzw=_quaternions(fields), up=up)
-    return Body(name, times_s, positions_m, headings_rad=_headings(data, fields, times_s, options), up=up)
+    headings, axis = _headings(data, fields, times_s, options, lambda sentence: warn(f"{path}: {sentence}"))
+    return Body(name, times_s, positions_m, headings_rad=headings, up=up, heading_axis=axis)
 
 
-def _headings(data: dict[tuple[str, int], Any], fields: Any, times_s: Floats, options: ReadOptions) -> Floats | None:
-    """Of the estimate itself, or else of the attitude at its times; clockwise from north becomes counter-clockwise."""
-    for yaw in ("heading", "yaw"):
-        if yaw in fields and np.any(np.isfinite(fields[yaw])):
-            return -np.asarray(fields[yaw], dtype=float)
+def _headings(
+    data: dict[tuple[str, int], Any], fields: Any, times_s: Floats, options: ReadOptions, warn: Warn
+) -> tuple[Floats | None, str | None]:
+    """Of the estimate itself, or else of the attitude at its times; clockwise from north becomes counter-clockwise.
+
+    The axis of the body that they are of is the second; an axis that was asked for is that of the attitude.
+    """
     attitude = data.get((_ATTITUDE, 0))
-    if attitude is None or "q[0]" not in attitude:
-        return None
-    return headings_at(
-        times_s, _sampled(attitude) * options.seconds("us"), headings_of_quaternions(_quaternions(attitude), "-z")
-    )
+    if attitude is not None and "q[0]" not in attitude:
+        attitude = None
+    for yaw in ("heading", "yaw"):
+        stated = yaw in fields and np.any(np.isfinite(fields[yaw]))
+        if stated and (options.heading_axis is None or attitude is None):
+            return -np.asarray(fields[yaw], dtype=float), None
+    if attitude is None:
+        return None, None
+    quaternions = _quaternions(attitude)
+    axis = chosen_axis(quaternions, "-z", options.heading_axis, f"the {options.heading_axis} axis of the vehicle", warn)
+    measured_s = _sampled(attitude) * options.seconds("us")
+    return headings_at(times_s, measured_s, headings_of_quaternions(quaternions, "-z", axis)), axis
 
 
 def _quaternions(fields: Any) -> Floats:

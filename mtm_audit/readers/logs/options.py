@@ -8,7 +8,7 @@ from mtm_onboard.protocol.errors import MtmError
 
 METRES = MappingProxyType({"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048})
 SECONDS = MappingProxyType({"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9})
-UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
+AXES = ("x", "y", "z", "-x", "-y", "-z")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,14 +16,16 @@ class ReadOptions:
     """How to read a log where it leaves something open.
 
     `unit` and `time_unit` are those of its positions and times, `up` the axis that points away from the floor; each
-    comes before what the file says or its format usually has. `topics` are the parts to read of a log that holds
-    several, and `bodies` the markers of rigid bodies by the body's name. `arrival_times` takes the instants at which
-    messages were recorded instead of those that they carry. Raises MtmError when a unit or an axis is unknown.
+    comes before what the file says or its format usually has. `heading_axis` is the axis of a body whose direction is
+    its heading, None for the one that lies level. `topics` are the parts to read of a log that holds several, and
+    `bodies` the markers of rigid bodies by the body's name. `arrival_times` takes the instants at which messages were
+    recorded instead of those that they carry. Raises MtmError when a unit or an axis is unknown.
     """
 
     unit: str | None = None
     time_unit: str | None = None
     up: str | None = None
+    heading_axis: str | None = None
     topics: tuple[str, ...] = ()
     bodies: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     arrival_times: bool = False
@@ -31,7 +33,8 @@ class ReadOptions:
     def __post_init__(self) -> None:
         _check("unit of length", self.unit, tuple(METRES))
         _check("unit of time", self.time_unit, tuple(SECONDS))
-        _check("axis", self.up, UP_AXES)
+        _check("axis", self.up, AXES)
+        _check("axis of a body", self.heading_axis, AXES)
 
     def metres(self, stated: str | None = None) -> float:
         """Metres in the unit of the positions, of which the file states `stated`."""

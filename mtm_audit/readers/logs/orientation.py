@@ -15,8 +15,10 @@ _HORIZONTAL = {
     "x": ((0, 1, 0), (0, 0, 1)),
     "-x": ((0, 0, 1), (0, 1, 0)),
 }
-# An axis of the body that is steeper than this says little about where it looks; a camera's or an IMU's may stand.
-_STEEPEST = np.cos(np.deg2rad(30.0))
+# How far an axis may be from level without pointing any worse: the body's sway turns it by a fifth of the sway at most.
+_LEVEL = np.cos(np.deg2rad(12.0))
+# An axis nearer to the vertical than this shows no heading: the body's sway turns it anywhere.
+_UPRIGHT = np.sin(np.deg2rad(10.0))
 # No heading holds for longer while it is not measured.
 _FARTHEST_S = 0.5
 
@@ -28,18 +30,43 @@ def horizontal(vectors: Floats, up: str) -> Floats:
     return np.asarray(np.stack(columns, axis=1))
 
 
-def headings_of_quaternions(quaternions_xyzw: Floats, up: str) -> Floats:
+def headings_of_quaternions(quaternions_xyzw: Floats, up: str, axis: str) -> Floats:
     """Headings in radians, shape (n,), counter-clockwise seen from above; NaN where a quaternion is none.
 
-    They are the direction of the body's x axis on the floor. Where that stands upright all the time, the next axis
-    that does not takes its place, and all headings are off by a constant.
+    They are the direction on the floor of the body's `axis`, one of x, y, z, -x, -y and -z.
     """
+    side = _sides(quaternions_xyzw, up)["xyz".index(axis[-1])]
+    sign = -1.0 if axis.startswith("-") else 1.0
+    return np.asarray(np.arctan2(sign * side[:, 1], sign * side[:, 0]))
+
+
+def heading_axis_of(quaternions_xyzw: Floats, up: str) -> str:
+    """The first of the body's axes x, y and z that lies about level, by the median; else the one that lies most level.
+
+    Sensors and cameras are mounted in any way, and an axis that stands says little about where the body looks. Another
+    axis than the one that leads puts all headings off by a constant.
+    """
+    levels = [_levelness(side) for side in _sides(quaternions_xyzw, up)]
+    about_level = [axis for axis, level in zip("xyz", levels, strict=True) if level >= _LEVEL]
+    return about_level[0] if about_level else "xyz"[int(np.argmax(levels))]
+
+
+def stands_upright(quaternions_xyzw: Floats, up: str, axis: str) -> bool:
+    """Whether the body's `axis` is so near to the vertical, by the median, that it shows no heading."""
+    return bool(_levelness(_sides(quaternions_xyzw, up)["xyz".index(axis[-1])]) < _UPRIGHT)
+
+
+def _sides(quaternions_xyzw: Floats, up: str) -> list[Floats]:
+    """The horizontal parts (n, 2) of the body's three axes."""
     matrices = matrices_of_quaternions(quaternions_xyzw)
-    sides = [horizontal(matrices[:, :, axis], up) for axis in range(3)]
-    flatness = [_median(np.hypot(side[:, 0], side[:, 1])) for side in sides]
-    lying = [axis for axis in range(3) if flatness[axis] > np.sqrt(1.0 - _STEEPEST**2)]
-    side = sides[lying[0] if lying else 0]
-    return np.arctan2(side[:, 1], side[:, 0])
+    return [horizontal(matrices[:, :, axis], up) for axis in range(3)]
+
+
+def _levelness(side: Floats) -> float:
+    """The median length of an axis on the floor: 1 lies level, 0 stands upright; 0 where nothing is known."""
+    lengths = np.hypot(side[:, 0], side[:, 1])
+    known = lengths[np.isfinite(lengths)]
+    return float(np.median(known)) if len(known) else 0.0
 
 
 def matrices_of_quaternions(quaternions_xyzw: Floats) -> Floats:
@@ -86,11 +113,6 @@ def _where_known(rows: Floats, convert: Callable[[Floats], Floats]) -> Floats:
     if known.any():
         quaternions[known] = convert(rows[known])
     return quaternions
-
-
-def _median(values: Floats) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else 0.0
 
 
 def headings_at(times_s: Floats, known_s: Floats, headings_rad: Floats) -> Floats:

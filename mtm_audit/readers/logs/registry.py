@@ -122,7 +122,7 @@ def read_log(path: Path, options: ReadOptions | None = None, warn: Warn | None =
         # Damaged numbers are infinite or none, which is told where they are left out.
         with np.errstate(all="ignore"):
             log = (format_of(opening) or _likeliest(opening)).read(path, asked, told)
-            tracks = tuple(track_of(body, str(path), told) for body in log.bodies) + log.tracks
+            tracks = tuple(track_of(body, str(path), told, asked.heading_axis) for body in log.bodies) + log.tracks
         return Contents(_distinct(path, tracks), log.at)
     except SeveralPosesError as error:
         raise SeveralPosesError(_printable(str(error)), [_printable(name) for name in error.offered]) from error

@@ -108,6 +108,7 @@ def _body(body: Body) -> dict[str, Any]:
         "axes": list(body.axes),
         "seen": body.seen,
         "headings": body.headings,
+        "heading_axis": body.heading_axis,
         "travel": body.travel,
     }
 

@@ -163,7 +163,8 @@ def _range(low: float, high: float, form: str) -> str:
 
 
 def _body(body: Body) -> str:
-    turns = f"headings in {100.0 * body.headings:.0f} %" if body.headings else "no headings"
+    ahead = "" if body.heading_axis is None else f" of its {body.heading_axis} axis"
+    turns = f"headings{ahead} in {100.0 * body.headings:.0f} %" if body.headings else "no headings"
     seen = "" if body.seen == 1.0 else f", seen in {100.0 * body.seen:.0f} %"
     return (
         f"{body.name}: {_timeline(body.timeline, 'samples')}{seen}, {','.join(body.axes)} in {body.unit}, goes "

@@ -7,6 +7,7 @@ import pytest
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.detectors.matched.plants import FINE
 from mtm_audit.detectors.matched.profile import PlantProfile
+from mtm_audit.model.lens import Lens
 from mtm_audit.model.recorded_at import RecordedAt
 from mtm_audit.readers.logs.options import ReadOptions
 from mtm_onboard.protocol import MtmError
@@ -14,9 +15,11 @@ from mtm_onboard.protocol.revocation import RevocationList
 from tests.audit.batch.recordings import FAKE_SECRET, plan_of, save_keys
 
 PROFILE = PlantProfile(np.full(len(FINE.taps), 1.0 / len(FINE.taps)))
+LENS = Lens(name="a.yaml", size_px=(8, 6), focal_px=(9.0, 9.0), centre_px=(3.5, 2.5), distortion=(-0.3, 0.1, 0.0, 0.0))
 OTHER_PLANS = {
     "tracker": "colour:red", "reference": ("marker1",), "frame_rate_hz": 30.0, "speed": None, "code": "0" * 16,
     "reading": ReadOptions(bodies={"robot0": ("left", "right")}), "settings": DecodeSettings(onset_s=1.5),
+    "lens": LENS,
 }  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mtm_audit.decoding.decode import decode_tracks
-from mtm_audit.decoding.pieces import LONGEST_WHOLE_S, pieces_of
+from mtm_audit.decoding.pieces import LONGEST_WHOLE_S, part_of_track, pieces_of
 from mtm_audit.decoding.settings import DecodeSettings
 from mtm_audit.model.track import Track
 from mtm_audit.reporting.text import piece_sentence
@@ -84,3 +84,17 @@ def test_times_that_are_not_seconds_are_refused():
     track = still(900.0)
     with pytest.raises(MtmError, match="check that the times are seconds"):
         decode_tracks([replace(track, times_s=1000.0 * track.times_s)], KEY, DecodeSettings())
+
+
+def test_a_part_has_its_own_corners_and_headings():
+    times_s = np.arange(10.0)
+    corners = np.arange(80.0).reshape(10, 4, 2)
+    whole = Track(
+        name="marker0", times_s=times_s, positions=corners[:, 0], valid=np.ones(10, dtype=bool), unit="px",
+        headings_rad=times_s, corners=corners,
+    )  # fmt: skip
+    part = part_of_track(whole, 3.0, 5.0)
+    assert part.corners.tolist() == corners[3:5].tolist()
+    assert part.headings_rad.tolist() == [3.0, 4.0]
+    with pytest.raises(MtmError, match="times and corners differ in length"):
+        replace(whole, corners=corners[1:])

@@ -1,14 +1,21 @@
 """Robots that turn: noise along their own axes, and in their turning itself, through the public path."""
 
+import json
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from mtm_audit.decoding.decode import decode_tracks
 from mtm_audit.decoding.settings import DecodeSettings
+from mtm_audit.ingest.recording import read_recording
+from mtm_audit.model.recording import Recording
 from mtm_audit.model.track import Track
+from mtm_audit.readers.logs.options import ReadOptions
+from mtm_audit.readers.logs.registry import read_log
+from mtm_audit.reporting.json_report import json_report
 from mtm_audit.reporting.text import frame_sentence
 from mtm_onboard.protocol import Channel
 from tests.audit.moving_robot import key_of, scheme_of
@@ -56,6 +63,10 @@ def decoded(track, axes, **settings):
     return decode_tracks([track], key(axes), DecodeSettings(**settings))
 
 
+def told(found, *tracks):
+    return frame_sentence(Recording((), "motion capture", tracks), found)
+
+
 @pytest.mark.parametrize("onset_s", [None, ONSET_S], ids=["searched", "known"])
 def test_a_robot_that_spins_is_read_along_its_own_axes(onset_s):
     axes = ("vx", "vy")
@@ -63,7 +74,7 @@ def test_a_robot_that_spins_is_read_along_its_own_axes(onset_s):
     # Which symbol comes first nothing shows where the onset is searched.
     turns = [SENT] if onset_s is not None else [SENT[-place:] + SENT[:-place] for place in range(4)]
     assert (found.frame, found.symbols in turns) == ("body", True)
-    assert "headings as recorded" in frame_sentence(found)
+    assert "headings as recorded;" in told(found, driven(axes, spin_radps=1.2))
     blind = decoded(driven(axes, spin_radps=1.2, headings=False), axes, onset_s=onset_s)
     assert found.evidence.nats > blind.evidence.nats + 15.0
 
@@ -73,7 +84,7 @@ def test_a_robot_that_holds_its_heading_is_read_as_before():
     found = decoded(driven(axes), axes, onset_s=ONSET_S)
     without = decoded(driven(axes, headings=False), axes, onset_s=ONSET_S)
     assert (found.verdict, found.frame) == ("decoded", "world")
-    assert frame_sentence(found) is None
+    assert told(found, driven(axes)) is None
     assert found.evidence == without.evidence
 
 
@@ -89,7 +100,7 @@ def test_a_rover_without_headings_shows_them_by_its_path():
     axes = ("vx", "wz")
     found = decoded(driven(axes, headings=False), axes, onset_s=ONSET_S)
     assert (found.symbols, found.frame) == (SENT, "path")
-    assert "as their paths show them" in frame_sentence(found)
+    assert "as their paths show them" in told(found, driven(axes, headings=False))
 
 
 def test_the_paper_s_detector_reads_turning_as_well():
@@ -104,3 +115,46 @@ def test_another_key_s_robot_that_turns_says_nothing(axes):
     other = key_of(key(axes).scheme, b"another fake test secret" + bytes(8))
     found = decode_tracks([driven(axes, spin_radps=0.8)], other, DecodeSettings(onset_s=ONSET_S))
     assert (found.verdict, found.message) == ("absent", None)
+
+
+# Rows are the floor's two axes and up in the room's terms; columns a body's axes in terms of forward, left and up.
+ROOMS = {"z": np.eye(3), "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])}
+BODIES = {
+    "z": np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
+    "-y": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+}
+
+
+def captured(folder, track, up, ahead):
+    """The track as a rigid body in a room whose axis `up` points up; the body's axis `ahead` leads."""
+    floor = np.column_stack([track.positions, np.full(len(track.times_s), 0.2)])
+    turns = Rotation.from_euler("z", track.headings_rad[:, None])
+    poses = Rotation.from_matrix(ROOMS[up].T) * turns * Rotation.from_matrix(BODIES[ahead])
+    path = folder / "robot0.tum"
+    np.savetxt(path, np.column_stack([track.times_s, floor @ ROOMS[up], poses.as_quat()]), fmt="%.9f")
+    return path
+
+
+@pytest.mark.parametrize("up", ["z", "y"])
+@pytest.mark.parametrize("ahead", ["z", "-y"])
+def test_the_axis_that_leads_gives_the_heading(tmp_path, up, ahead):
+    track = driven(("vx", "vy"), spin_radps=1.2)
+    path = captured(tmp_path, track, up, ahead)
+    (read,) = read_log(path, ReadOptions(up=up, heading_axis=ahead)).tracks
+    assert np.abs(np.angle(np.exp(1j * (read.headings_rad - track.headings_rad)))).max() < 1e-6
+    assert (read.heading_axis, np.allclose(read.positions, track.positions)) == (ahead, True)
+
+
+@pytest.mark.parametrize(("up", "ahead"), [("y", "z"), ("z", "-y")], ids=["optitrack", "minus y leads"])
+def test_a_rigid_body_is_read_along_the_axis_that_leads(tmp_path, up, ahead):
+    path = captured(tmp_path, driven(("vx", "vy"), spin_radps=1.2), up, ahead)
+    recording = read_recording([path], "motion capture", options=ReadOptions(up=up, heading_axis=ahead))
+    found = decoded(recording.tracks[0], ("vx", "vy"), onset_s=ONSET_S)
+    assert (found.verdict, found.symbols, found.frame) == ("decoded", SENT, "body")
+    assert f"headings as recorded (the {ahead} axis of robot0);" in frame_sentence(recording, found)
+    assert json.loads(json_report(recording, found, ()))["channels"][0]["heading_axis"] == ahead
+    # Whichever axis lies level, headings are off by a constant at most, which decoding allows for.
+    (read,) = read_log(path, ReadOptions(up=up)).tracks
+    unasked = decoded(read, ("vx", "vy"), onset_s=ONSET_S)
+    assert read.heading_axis == "x"
+    assert unasked.evidence.nats == pytest.approx(found.evidence.nats, abs=1.0)

@@ -35,7 +35,7 @@ def write_c3d(folder, *poses, corners_m=CORNERS_M, rate_hz=100.0, hidden=None):
     return path
 
 
-LETTERS = {"uint64_t": "Q", "float": "f", "bool": "?", "uint8_t": "B"}
+LETTERS = {"uint64_t": "Q", "float": "f", "bool": "?", "uint8_t": "B", "float[4]": "4f"}
 
 
 class UlogWriter:
@@ -74,19 +74,24 @@ LOCAL = (
 )  # fmt: skip
 
 
-def write_ulog(folder, pose, gps_late_us=0, instances=1, valid=None):
+def write_ulog(folder, pose, gps_late_us=0, instances=1, valid=None, attitude=False):
     """North is the pose's x, west its y; messages are published 4 ms after what they say, and a GPS fix comes late."""
     log = UlogWriter()
     log.define("vehicle_local_position", LOCAL)
     log.define("sensor_gps", (("uint64_t", "timestamp"), ("uint64_t", "time_utc_usec")))
+    log.define("vehicle_attitude", (("uint64_t", "timestamp"), ("float[4]", "q")))
     for instance in range(instances):
         log.subscribe("vehicle_local_position", instance)
     log.subscribe("sensor_gps")
+    if attitude:
+        log.subscribe("vehicle_attitude")
     for index, ((time_s, (x, y, z), _), yaw) in enumerate(zip(pose.rows(), pose.headings_rad, strict=True)):
         at_us = BOOT_US + round(time_s * 1e6)
         known = valid is None or bool(valid[index])
         for instance in range(instances):
             log.log("vehicle_local_position", at_us + 4000, at_us, x, -y, -z, wrap(-yaw), known, instance=instance)
+        if attitude:
+            log.log("vehicle_attitude", at_us, np.cos(-yaw / 2), 0.0, 0.0, np.sin(-yaw / 2))
         if index % 20 == 10:
             # Without a fix yet, then late once, then right.
             utc_us = 0 if index == 10 else round(UNIX_S * 1e6) + round(time_s * 1e6)

@@ -100,6 +100,15 @@ def test_an_export_with_z_up_is_read_with_the_axis_named(tmp_path):
     assert np.ptp(sideways[:, 1]) < 1e-6
 
 
+def test_the_axis_that_leads_a_body_of_motive_is_named(tmp_path):
+    path = write_motive(tmp_path, FIRST)
+    (usual,), (named,) = (read_log(path, ReadOptions(heading_axis=axis)).tracks for axis in (None, "z"))
+    # Beside x and up is z, to the right.
+    off = np.angle(np.exp(1j * (named.headings_rad - usual.headings_rad + np.pi / 2)))
+    assert np.abs(off).max() < 1e-4
+    assert (usual.heading_axis, named.heading_axis) == ("x", "z")
+
+
 def test_a_unit_given_comes_before_that_of_the_header(tmp_path):
     (track,) = read_log(write_motive(tmp_path, FIRST), ReadOptions(unit="m")).tracks
     assert track.positions[1] == pytest.approx(1000 * FIRST.positions_m[1, :2], abs=1e-3)

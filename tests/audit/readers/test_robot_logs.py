@@ -81,6 +81,20 @@ def test_what_an_autopilot_did_not_know_is_missing(tmp_path):
         read_log(write_ulog(tmp_path, POSE, valid=np.zeros(301, dtype=bool)))
 
 
+def test_a_named_axis_is_that_of_the_vehicle_s_attitude(tmp_path):
+    path = write_ulog(tmp_path, POSE, attitude=True)
+    (stated,) = read_log(path).tracks
+    (named,) = read_log(path, ReadOptions(heading_axis="-y")).tracks
+    # The y axis of an aircraft points to its right.
+    off = np.angle(np.exp(1j * (named.headings_rad - stated.headings_rad - np.pi / 2)))
+    assert np.abs(off).max() < 1e-3
+    assert (stated.heading_axis, named.heading_axis) == (None, "-y")
+    warnings = []
+    (upright,) = read_log(path, ReadOptions(heading_axis="z"), warnings.append).tracks
+    assert upright.heading_axis == "x"
+    assert f"{path}: the z axis of the vehicle stands upright" in warnings[0]
+
+
 def test_odometry_after_a_change_of_version_is_read(tmp_path):
     (track,) = read_log(write_tlog(tmp_path, POSE, odometry=True)).tracks
     # The first fifty samples were sent in version 1, which has no such message.

@@ -30,7 +30,7 @@ def test_a_bag_with_several_poses_lists_what_each_holds(tmp_path):
     bag = write_rosbag2(tmp_path, driving("left"), driving("right"), kind="nav_msgs/msg/Odometry")
     whole = survey_log(bag)
     assert {body.name for body in whole.bodies} == {"left", "right"}
-    assert all(body.headings == 1.0 for body in whole.bodies)
+    assert all((body.headings, body.heading_axis) == (1.0, "x") for body in whole.bodies)
     assert whole.format == "ROS 2 bag"
 
 

@@ -280,3 +280,16 @@ def test_a_long_pan_is_taken_out_over_several_key_pictures():
     track = robot(frames)
     assert track.valid.all()
     assert np.std(track.positions[:, 0] - places) < 0.3
+
+
+def test_corners_go_where_their_frame_goes():
+    shifts = np.tile(np.eye(3), (5, 1, 1))
+    shifts[:, 0, 2] = np.arange(5)
+    shifts[4] = np.nan
+    places, offsets = np.full((5, 2), 20.0), np.array([[-3.0, 3.0], [3.0, 3.0], [3.0, -3.0], [-3.0, -3.0]])
+    corners = places[:, None] + offsets
+    track = Track("marker0", np.arange(5.0), places, np.ones(5, dtype=bool), unit="px", corners=corners)
+    moved = CameraPath(shifts, 0.0, "a test").applied(track)
+    assert moved.corners[:4] == pytest.approx(moved.positions[:4, None] + offsets)
+    assert moved.corners[3, 0].tolist() == [20.0, 23.0]
+    assert np.isnan(moved.corners[4]).all()

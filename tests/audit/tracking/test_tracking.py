@@ -9,7 +9,7 @@ from hil.sensors.optics import Optics, overhead
 from hil.sensors.poses import Occlusion, Trajectory
 from hil.sensors.scene import Scene
 from hil.sensors.video import write_video
-from mtm_audit.ingest.load import load_tracks
+from mtm_audit.ingest.load import load_tracks, tracked
 from mtm_audit.model.picture import Frame
 from mtm_audit.model.track import Track
 from mtm_audit.readers.video import read_frames
@@ -83,7 +83,9 @@ def test_headings_are_counter_clockwise_from_the_pictures_right(tmp_path):
 
 
 def test_a_tilted_noisy_phone_of_irregular_frames_tracks(tmp_path):
-    tracks = load_tracks(filmed(PHONE, tmp_path / "film.mp4"))
+    path, pictured = filmed(PHONE, tmp_path / "film.mp4"), []
+    above = tracked(read_frames(path), "aruco", keep=pictured.append)
+    tracks = pictured[0].tracks
     assert [track.name for track in tracks] == ["marker0", "marker1"]
     nominal = round(SECONDS * PHONE.rate_hz) + 1
     for track, robot in zip(tracks, wandering(), strict=True):
@@ -91,6 +93,12 @@ def test_a_tilted_noisy_phone_of_irregular_frames_tracks(tmp_path):
         assert np.std(np.diff(track.times_s)) > 0.003
         assert track.valid.mean() > 0.95
         assert rms(errors_px(track, robot, PHONE.optics)) < 0.3
+    for track, robot in zip(above, wandering(), strict=True):
+        # Seen from above, the path is that on the floor, but for its scale, and where and how it lies.
+        true = robot.at(track.times_s[track.valid])[0] @ np.array([1.0, 1j])
+        found = track.positions[track.valid] @ np.array([1.0, 1j])
+        true, found = true - true.mean(), found - found.mean()
+        assert np.linalg.norm(np.vdot(found, true) / np.vdot(found, found) * found - true) < 0.05 * np.linalg.norm(true)
 
 
 def test_an_occluded_robot_is_missing_and_comes_back(tmp_path):

@@ -37,7 +37,9 @@ EMPTY = FilmSurvey(
     warnings=(),
 )
 TENTHS = timeline_of(np.arange(11) / 10.0)
-BODY = Body(name="left", timeline=TENTHS, unit="m", axes=("x", "y"), seen=0.9, headings=0.5, travel=2.0)
+BODY = Body(
+    name="left", timeline=TENTHS, unit="m", axes=("x", "y"), seen=0.9, headings=0.5, heading_axis=None, travel=2.0
+)
 LOG = LogSurvey(path=Path("a.bag"), format="ROS 1 bag", bodies=(BODY,), topics=(), begun_unix_s=None, warnings=())
 
 
@@ -138,6 +140,8 @@ def test_a_log_is_told_with_its_gaps_and_headings():
         "left: 11 samples, 1.0 s from 0.000 s on, 10 a second, constant, seen in 90 %, x,y in m, goes 2 m, "
         "headings in 50 %"
     )
+    ahead = replace(BODY, heading_axis="-y")
+    assert "headings of its -y axis in 50 %" in said(replace(LOG, bodies=(ahead,)), "bodies")
     assert said(replace(LOG, begun_unix_s=1.7e9), "recorded") == "from 2023-11-14 22:13:20 UTC on, by its clock"
     later = replace(BODY, timeline=timeline_of(1.7e9 + np.arange(11) / 10.0))
     since_1970 = replace(LOG, begun_unix_s=0.0, bodies=(later,))
