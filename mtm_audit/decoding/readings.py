@@ -12,6 +12,7 @@ from mtm_audit.decoding.association import Association, associate, exchanged, sh
 from mtm_audit.decoding.start import Start
 from mtm_audit.decoding.views import Part, frames_of, parts_of, together, view_strengths
 from mtm_audit.detectors.base import ChannelReading, Detector
+from mtm_audit.detectors.matched.candidates import forget
 from mtm_audit.model.glimpse import Glimpse, glimpse_of_track
 from mtm_audit.model.reference_frame import ReferenceFrame
 from mtm_audit.model.stage import stage
@@ -168,6 +169,9 @@ class _Reader:
 
     def _view(self, channels: Sequence[Channel], association: Association, frame: ReferenceFrame) -> _View:
         read, refusals = self._apart(channels, association, frame)
+        if self.scheme.schedule == "fixed":
+            # Evidence looks at a few candidates, and takes the memory of all for its tables.
+            forget(self.codebooks[0])
         log_evidence = self.detector.strength_law == "log evidence"
         # What a channel's parts say is not kept beside what they say together.
         parts = {name: together(read.pop(name), log_evidence=log_evidence) for name in list(read)}

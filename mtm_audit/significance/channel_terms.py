@@ -256,8 +256,9 @@ def _terms_at(channel: ChannelTerms, timing: Timing, near: Neighbourhood) -> Ter
         for grid in np.meshgrid(np.arange(len(near.log_priors)), np.arange(len(SHAPES.taps)), indexing="ij")
     )
     log_priors = near.log_priors[timings] - np.log(len(SHAPES.taps))
+    # The largest of all tables chooses pairs and weighs nothing: single precision will do.
     coarse = approximate_log_e(
-        projections, channel.tones, coarse_levels(), channel.turns, timings, plants, channel.by_position
+        projections, channel.tones, coarse_levels(), channel.turns, timings, plants, channel.by_position, np.float32
     )
     return Terms(channel, projections, timings, plants, log_priors, coarse)
 

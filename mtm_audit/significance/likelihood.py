@@ -8,6 +8,7 @@ mean over that law (`normaliser`) has mean 1 over keys: it is an e-value.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,13 +41,14 @@ def approximate_log_e(
     timings: Integers,
     plants: Integers,
     by_position: Callable[[Floats], Floats],
+    precision: type[np.floating[Any]] = np.float64,
 ) -> Floats:
     """Log e-values of pairs of a timing and a plant: (pairs, levels, orientations, positions, candidates).
 
     `tones` (groups, candidates, injected axes, 2 K); `timings` and `plants` (pairs,); `by_position` adds up the groups
-    of a position, some pairs after the others, since a table of all groups is large. With observed axes that leave
-    each other's precision alone and tones taken to be normal: to choose hypotheses and to weigh them, never as
-    evidence.
+    of a position, some pairs after the others, since a table of all groups is large; `precision` is the
+    result's. With observed axes that leave each other's precision alone and tones taken to be normal: to choose
+    hypotheses and to weigh them, never as evidence.
     """
     groups, candidates = tones.shape[:2]
     each = len(levels.magnitudes) * len(turns) * groups * candidates
@@ -56,7 +58,7 @@ def approximate_log_e(
         some = slice(at, at + step)
         table = by_position(_approximate(projections, tones, levels, turns, timings[some], plants[some]))
         if at == 0:
-            result = np.empty((len(timings), *table.shape[1:]))
+            result = np.empty((len(timings), *table.shape[1:]), dtype=precision)
         result[some] = table
     return result
 

@@ -49,6 +49,11 @@ def stacked_tones(codebook: Codebook, channel: Channel, number: int, symbols: Se
     return derived
 
 
+def forget(codebook: Codebook) -> None:
+    """Keep no more of a codebook's tones: they are derived again when they are asked for."""
+    _kept.pop(codebook, None)
+
+
 def _whole(codebook: Codebook, channel: Channel, number: int) -> Tones:
     """All candidates' tones, a block of symbols after the other."""
     count = codebook.scheme.alphabet_size

@@ -223,27 +223,29 @@ def _information_of_few(place: _Shifted, seen: _Seen, tones: Sequence[Tones]) ->
     Timings of one question lie close together, so that they share most cells. A candidate that is strong between two
     cells is so at one of them; one that is missed would only have added evidence.
     """
-    count, axes, width = tones[0].shape
+    _, axes, width = tones[0].shape
     hypotheses, windows, observed, _ = place.columns.shape
     result = np.zeros((hypotheses, windows, _KEPT, observed * axes), dtype=np.float32)
     own = seen.numbers % len(tones)
     for number in np.unique(own[seen.inside]):
         rows, places = np.nonzero((own == number) & seen.inside)
         below = np.floor(place.lags[rows, places]).astype(np.int64)
-        cells, at = np.unique(np.stack([below, below + 1]), return_inverse=True)
-        near = _strongest_by_cell(place.heard, cells, tones[number])[at.reshape(2, -1)]
-        flat = tones[number].reshape(count, axes * width)
-        for chunk in np.array_split(np.arange(len(rows)), -(-len(rows) * 2 * _NEAR_A_CELL // _MOST_FEW)):
+        cells = np.unique([below, below + 1])
+        near = _strongest_by_cell(place.heard, cells, tones[number])
+        order = np.argsort(below, kind="stable")
+        # Windows between the same two cells have the same candidates; at most so many of them at once.
+        between, first = np.unique(below[order], return_index=True)
+        for cell, several in zip(between, np.split(order, first[1:]), strict=True):
+            at = int(np.searchsorted(cells, cell))
             # One candidate may be near both cells: it must count once.
-            chosen = np.sort(np.concatenate([near[0, chunk], near[1, chunk]], axis=1), axis=1)
-            again = np.concatenate([np.zeros((len(chunk), 1), dtype=np.bool_), chosen[:, 1:] == chosen[:, :-1]], axis=1)
-            columns = place.columns[rows[chunk], places[chunk]]
-            few = flat[chosen].reshape(len(chunk), -1, width)
-            values = (few @ columns.transpose(0, 2, 1)).reshape(len(chunk), chosen.shape[1], axes, observed)
-            values = values.transpose(0, 1, 3, 2).reshape(len(chunk), chosen.shape[1], observed * axes)
-            strength = np.where(again, -1.0, np.sum(values**2, axis=2))
-            strongest = np.argpartition(-strength, _KEPT, axis=1)[:, :_KEPT]
-            result[rows[chunk], places[chunk]] = np.take_along_axis(values, strongest[:, :, None], axis=1)
+            chosen = np.unique(near[at : at + 2])
+            few = tones[number][chosen].reshape(-1, width)
+            for chunk in np.array_split(several, -(-len(several) * len(chosen) // _MOST_FEW)):
+                columns = place.columns[rows[chunk], places[chunk]].reshape(-1, width)
+                values = (columns @ few.T).reshape(len(chunk), observed, len(chosen), axes)
+                values = values.transpose(0, 2, 1, 3).reshape(len(chunk), len(chosen), observed * axes)
+                strongest = np.argpartition(-np.sum(values**2, axis=2), _KEPT, axis=1)[:, :_KEPT]
+                result[rows[chunk], places[chunk]] = np.take_along_axis(values, strongest[:, :, None], axis=1)
     return result
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from mtm_audit.detectors.matched.plants import plant_family
 from mtm_audit.detectors.matched.projections import Places, project
+from mtm_audit.significance import likelihood
 from mtm_audit.significance.channel_terms import SHAPES
 from mtm_audit.significance.gains import all_levels, orientations
 from mtm_audit.significance.likelihood import Hypotheses, approximate_log_e, log_e, log_e_of, weights
@@ -144,6 +145,23 @@ def test_the_approximation_is_exact_where_axes_are_seen_alike():
     chosen = Hypotheses(timings[pair], plants[pair], level, turn)
     exact = log_e(alike, tones, all_levels(), TURNS, chosen, "ensemble")
     assert table.reshape(exact.shape) == pytest.approx(exact, rel=1e-9, abs=1e-9)
+
+
+def test_the_approximation_adds_up_positions_part_by_part(monkeypatch):
+    """A table of all windows is never held: windows of one position are added up a part of the pairs at a time."""
+    terms = projected(prepared())
+    tones, pairs = both_groups(waveforms("ensemble")[:6]), np.arange(5)
+    asked = (terms, tones, all_levels(), TURNS, pairs % 2, pairs)
+    groups = approximate_log_e(*asked, lambda table: table)
+    monkeypatch.setattr(likelihood, "_MOST_TOGETHER", 2 * groups[0].size)
+    sizes = []
+
+    def both(table):
+        sizes.append(len(table))
+        return table.sum(axis=-2, keepdims=True)
+
+    assert approximate_log_e(*asked, both) == pytest.approx(groups.sum(axis=-2, keepdims=True))
+    assert sizes == [2, 2, 1]
 
 
 @pytest.mark.parametrize("start_s", [-5.0, -1.0, 9.5, 40.0])

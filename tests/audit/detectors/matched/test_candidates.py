@@ -76,6 +76,16 @@ def test_nothing_is_kept_of_a_codebook_that_is_gone(counted):
     assert len(module._kept) == 0
 
 
+def test_what_is_forgotten_is_derived_again(counted):
+    large = codebook_of(12)
+    first = stacked_tones(large, channel_of(large), 0)
+    module.forget(large)
+    module.forget(large)
+    again = stacked_tones(large, channel_of(large), 0)
+    assert again is not first
+    assert np.array_equal(again, first)
+
+
 def test_a_small_alphabet_s_windows_are_derived_once(counted):
     small = codebook_of(4)
     tones = LazyTones(small, channel_of(small), 2)

@@ -4,7 +4,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
-from mtm_audit.detectors.matched.noise import fit_noise, fit_noise_by_axis, model_order, power_response, whitened
+from mtm_audit.detectors.matched.noise import (
+    fit_noise,
+    fit_noise_by_axis,
+    model_order,
+    power_response,
+    whitened,
+    whitened_from_silence,
+)
 
 POLES = np.array([1.0, -0.8, 0.4])
 
@@ -22,6 +29,15 @@ def test_whitening_is_a_linear_filter_less_its_first_samples(seed, order, rows):
     rng = np.random.default_rng(seed)
     taps, signals = np.concatenate([[1.0], rng.standard_normal(order)]), rng.standard_normal((rows, 40))
     assert whitened(signals, taps) == pytest.approx(signal.lfilter(taps, [1.0], signals, axis=-1)[:, order:])
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 16), st.integers(1, 150), st.data())
+def test_whitening_from_silence_has_zeros_before(seed, order, cells, data):
+    history = data.draw(st.integers(max(0, order - cells), order))
+    rng = np.random.default_rng(seed)
+    taps, signals = np.concatenate([[1.0], rng.standard_normal(order)]), rng.standard_normal((2, 3, cells))
+    silent = np.concatenate([np.zeros((2, 3, history)), signals], axis=2)
+    assert whitened_from_silence(signals, history, taps) == pytest.approx(whitened(silent, taps))
 
 
 @given(st.lists(st.floats(-2.0, 2.0), min_size=1, max_size=8))
