@@ -1,12 +1,8 @@
 """Evidence of timing hypotheses with one set of gains for all windows of a recording.
 
 Window by window, unknown gains cost more than a short window has to give; shared by all windows they cost once.
-The gains are found by expectation-maximisation from several rotations and mirrorings of the camera.
-
-The interference is fitted to motion that holds the message, so a loud message makes its own candidates look poor. Two
-things set that right: with each set of gains the part of the band's power that they explain is taken off the
-interference again, and what a window's candidates reach is compared with what waveforms drawn at random would reach in
-the same motion, in closed form, as evidence is (`significance.likelihood`).
+The gains are found by expectation-maximisation from several rotations and mirrorings of the camera, and each set of
+them takes what it explains off the interference again (`relief`).
 """
 
 from collections.abc import Sequence
@@ -18,14 +14,12 @@ from numpy.typing import NDArray
 from mtm_audit.detectors.matched.candidates import WHOLE, Tones
 from mtm_audit.detectors.matched.correlate import Heard, template_power
 from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE
+from mtm_audit.detectors.matched.relief import Relief, relief_of
 from mtm_audit.model.track import Bools, Floats
 
 _FIRST_ROUNDS = 2
 _LAST_ROUNDS = 3
 _KEPT = 32
-# How much of the power that gains explain is taken off the interference, and the largest part they may explain.
-_RELIEF = 0.8
-_LARGEST_SHARE = 0.95
 # Hypotheses times windows of one computation; each takes about a kilobyte.
 _MOST_TOGETHER = 32_768
 # Windows times candidates of one product of matrices.
@@ -112,63 +106,24 @@ def _answer(heard: Heard, asked: Sequence[tuple[Sequence[Tones], _Seen]], step_s
     pairs: Floats = (np.concatenate(energies) * visible).astype(np.float32)
     information = np.concatenate(informations)
     information *= visible[..., None]
-    explained = _Explained(heard, template_power(first, heard).astype(np.float32))
+    relief = relief_of(heard, first)
+    shown = [(places[id(seen)].columns, places[id(seen)].weights) for _, seen in asked]
+    ends = np.cumsum([len(seen.lags) for _, seen in asked])[:-1]
+
+    def by_chance(gains: Floats) -> Floats:
+        return np.concatenate(
+            [relief.by_chance(*each, own) for each, own in zip(shown, np.split(gains, ends), strict=True)]
+        )
+
     gains = np.repeat(_starting_gains(observed, axes)[None], len(information), axis=0)
     for _ in range(_FIRST_ROUNDS):
-        gains = _better_gains(information, pairs, gains, count, explained)
-    seen_at = [(places[id(seen)], len(seen.lags)) for _, seen in asked]
-    fits = _fit(information, pairs, gains, count, visible, explained, _by_chance(seen_at, gains, explained))
+        gains = _better_gains(information, pairs, gains, count, relief)
+    fits = _fit(information, pairs, gains, count, visible, relief, by_chance(gains))
     gains = np.take_along_axis(gains, np.argmax(fits, axis=1)[:, None, None], axis=1)
     for _ in range(_LAST_ROUNDS):
-        gains = _better_gains(information, pairs, gains, count, explained)
-    by_chance = _by_chance(seen_at, gains, explained)
+        gains = _better_gains(information, pairs, gains, count, relief)
     spent = 0.5 * np.log1p(GAIN_VARIANCE * pairs.sum(axis=1)).sum(axis=1)
-    return np.asarray(_fit(information, pairs, gains, count, visible, explained, by_chance)[:, 0] - spent)
-
-
-@dataclass(frozen=True)
-class _Explained:
-    """How much of the interference's power in the band gains explain; `power` (observed axes, axes) of a template in a
-    cell.
-    """
-
-    heard: Heard
-    power: NDArray[np.float32]
-
-    def factors(self, gains: Floats) -> Floats:
-        """How much quieter the interference is than fitted for gains (..., pairs), for each pair."""
-        observed, axes = self.power.shape
-        squares = gains.reshape(*gains.shape[:-1], observed, axes) ** 2
-        # A cell holds a unit of interference, of which the band has 2 K parts of as many as there are cells.
-        share = np.sum(squares * self.power, axis=-1) * np.float32(self.heard.cells / self.heard.steady.shape[1])
-        return np.asarray(np.repeat(1.0 / (1.0 - _RELIEF * np.minimum(share, _LARGEST_SHARE)), axes, axis=-1))
-
-
-def _by_chance(places: Sequence[tuple["_Shifted", int]], gains: Floats, explained: _Explained) -> Floats:
-    """`_log_mean` (hypotheses, windows, starts) for gains (hypotheses, starts, pairs), of places with so many
-    hypotheses each, one after the other.
-    """
-    ends = np.cumsum([count for _, count in places])[:-1]
-    return np.concatenate(
-        [
-            np.stack([_log_mean(place, own[:, start], explained) for start in range(own.shape[1])], axis=-1)
-            for (place, _), own in zip(places, np.split(gains, ends), strict=True)
-        ]
-    )
-
-
-def _log_mean(place: "_Shifted", gains: Floats, explained: _Explained) -> Floats:
-    """Log of the mean likelihood ratio of normal waveforms drawn at random, (hypotheses, windows), for gains
-    (hypotheses, pairs): a tone of weights u and q and variance v adds u^2 v / (2 (1 + q v)) - log(1 + q v) / 2.
-    """
-    heard = explained.heard
-    observed, axes = explained.power.shape
-    turned = gains.reshape(-1, observed, axes)
-    factors = explained.factors(gains).reshape(turned.shape).astype(np.float32)
-    linear = np.einsum("hoa,hwok->hwak", turned * factors, place.columns, optimize=True)
-    quadratic = np.einsum("hoa,hwo,ok->hwak", 0.5 * turned**2 * factors, place.weights, heard.steady, optimize=True)
-    grown = 1.0 + quadratic * heard.spread
-    return np.asarray(0.5 * np.sum(linear**2 * heard.spread / grown - np.log(grown), axis=(2, 3)))
+    return np.asarray(_fit(information, pairs, gains, count, visible, relief, by_chance(gains))[:, 0] - spent)
 
 
 @dataclass(frozen=True)
@@ -281,10 +236,10 @@ def _starting_gains(observed: int, axes: int) -> NDArray[np.float32]:
     return np.stack(starts).astype(np.float32) * np.float32(np.sqrt(GAIN_VARIANCE))
 
 
-def _ratios(information: Floats, energy: Floats, gains: Floats, explained: _Explained) -> Floats:
+def _ratios(information: Floats, energy: Floats, gains: Floats, relief: Relief) -> Floats:
     """Log-likelihood ratios (hypotheses, windows, kept, starts); `gains` (hypotheses, starts, pairs)."""
     hypotheses, windows, kept, pairs = information.shape
-    factors = explained.factors(gains)
+    factors = relief.factors(gains)
     pulled, spent = (gains * factors).transpose(0, 2, 1), (gains**2 * factors).transpose(0, 2, 1)
     linear = (information.reshape(hypotheses, windows * kept, pairs) @ pulled).reshape(hypotheses, windows, kept, -1)
     return np.asarray(linear - 0.5 * (energy @ spent)[:, :, None])
@@ -301,23 +256,22 @@ def _log_mixture(ratios: Floats, count: int, by_chance: Floats | float = 0.0) ->
 
 
 def _fit(
-    information: Floats, energy: Floats, gains: Floats, count: int, visible: Bools, explained: _Explained,
-    by_chance: Floats | float = 0.0,
+    information: Floats, energy: Floats, gains: Floats, count: int, visible: Bools, relief: Relief, by_chance: Floats
 ) -> Floats:  # fmt: skip
     """Log-likelihood of the windows seen plus log prior of the gains, (hypotheses, starts)."""
-    ratios = _ratios(information, energy, gains, explained)
+    ratios = _ratios(information, energy, gains, relief)
     carried = _log_mixture(ratios, count, by_chance) - np.log(2.0)
     fit = np.where(visible, carried, 0.0).sum(axis=1) - 0.5 * np.sum(gains**2, axis=2) / GAIN_VARIANCE
     return np.asarray(fit)
 
 
-def _better_gains(information: Floats, energy: Floats, gains: Floats, count: int, explained: _Explained) -> Floats:
+def _better_gains(information: Floats, energy: Floats, gains: Floats, count: int, relief: Relief) -> Floats:
     """One step of expectation-maximisation."""
-    ratios = _ratios(information, energy, gains, explained)
+    ratios = _ratios(information, energy, gains, relief)
     belief = np.exp(ratios - _log_mixture(ratios, count)[:, :, None]) / count
     hypotheses, windows, kept, starts = belief.shape
     turned = belief.reshape(hypotheses, windows * kept, starts).transpose(0, 2, 1)
-    factors = explained.factors(gains)
+    factors = relief.factors(gains)
     pulled = turned @ information.reshape(hypotheses, windows * kept, -1) * factors
     weight = belief.sum(axis=2).transpose(0, 2, 1) @ energy * factors + 1.0 / GAIN_VARIANCE
     return np.asarray(pulled / weight)
