@@ -16,7 +16,7 @@ DAY = date(2025, 1, 1)
 # Options that name what is read. All others that name a file or folder name what is written.
 INPUTS = {
     "--key", "--anchor", "--disclosed", "--profile", "--revoked", "--like", "--check", "--scheme", "--master",
-    "--config", "--socket", "--device-key",
+    "--config", "--socket", "--device-key", "--camera",
 }  # fmt: skip
 # What `identify` learns is an output, though `decode` reads it.
 OUTPUTS = {("mtm-hil identify", "--profile")}

@@ -274,25 +274,35 @@ def _doubt_outliers(
     motions: Sequence[Motion],
     noise: NoiseModel,
 ) -> None:
-    """Let each kept candidate answer for the outliers that it leaves."""
+    """Let each kept candidate answer for the outliers that it leaves, under each hypothesis by itself."""
     residuals = _residuals(judged, motions)
     for state, data, alternatives in zip(judged, found, hypotheses, strict=True):
-        likeliest = max(alternatives, key=lambda each: float(log_sum_exp(each.ratios, axis=0)))
-        own, signals = _without_others(state, residuals), _signals_of(state, data, likeliest)
-        state.ratios = state.ratios + outlier_correction(state.window, signals, noise, own)
+        own = _without_others(state, residuals)
+        ratios = [
+            each.ratios + outlier_correction(state.window, _signals_of(state, data, each), noise, own)
+            for each in alternatives
+        ]
+        state.ratios = log_sum_exp(np.stack(ratios), axis=0) - np.log(len(ratios))
     _believe(judged)
 
 
 def _signals_of(state: _Judged, data: Statistics, hypothesis: _Hypothesis) -> Floats:
-    """What each kept candidate adds to the motion in units of the noise, (axes, L, n): by the likeliest plant, with the
-    gains that fit the candidate and what the other windows say.
+    """What each kept candidate adds to the motion in units of the noise, (axes, L, n): by the plant and with the gains
+    that are likeliest for it beside what the other windows say, each axis by itself.
     """
-    axes, plants = np.arange(len(hypothesis.plants)), np.argmax(hypothesis.plants, axis=1)
-    known, gains = hypothesis.known[axes, plants], hypothesis.gains[axes, plants]
-    pulled = np.einsum("dab,db->da", known, gains)[:, None] + data.information[axes, :, plants]
-    fitted = np.linalg.solve(known[:, None] + data.precision[axes, :, plants], pulled[..., None])[..., 0]
+    known = hypothesis.known
+    information = np.einsum("dpab,dpb->dpa", known, hypothesis.gains)
+    precision = known[:, None] + data.precision
+    pulled = information[:, None] + data.information
+    with np.errstate(divide="ignore"):
+        likely = np.log(hypothesis.plants) - half_log_evidence(known, information)
+    plants = np.argmax(half_log_evidence(precision, pulled) + likely[:, None], axis=2)
+    axes, rows = np.indices(plants.shape)
+    fitted = np.linalg.solve(precision[axes, rows, plants], pulled[axes, rows, plants][..., None])[..., 0]
     tones = np.einsum("dla,lak->dlk", fitted, state.tones)
-    return np.asarray(tones @ state.rows[plants])
+    return np.stack(
+        [np.einsum("lk,lkn->ln", own, state.rows[chosen]) for own, chosen in zip(tones, plants, strict=True)]
+    )
 
 
 def _expect_signals(judged: Sequence[_Judged], hypotheses: Sequence[list[_Hypothesis]], noise: NoiseModel) -> None:
