@@ -132,7 +132,7 @@ def test_a_clean_environment_gets_what_the_extra_promises(built, pins, recording
     run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-c", pins, wanted)
     run(python, "-m", "pip", "check")
     run(python, "-c", f"import {', '.join([*PROGRAMS.values(), *LIBRARIES.get(extra, [])])}")
-    assert "usage: mtm-onboard" in run(bin_folder / "mtm-onboard", "--help").stdout
+    assert "Usage: mtm-onboard" in run(bin_folder / "mtm-onboard", "--help").stdout
     for program in ("mtm-audit", "mtm-hil"):
         if extra in COMPLETE:
             assert f"Usage: {program}" in run(bin_folder / program, "--help").stdout
