@@ -100,7 +100,7 @@ def _csv_row(row: PlantRow, options: PlantsOptions) -> tuple[object, ...]:
     shares: list[object] = []
     for detector in DETECTORS:
         share = row.symbols[detector]
-        shares += [f"{value:.2f}" for value in (share.percent, *share.interval_percent)]
+        shares += share.figures
     return (
         Path(row.plant).name, " ".join(vehicle(row.plant).kind.axes),
         job.alphabet_size, job.ticks, job.windows, job.sigma,

@@ -65,7 +65,7 @@ def _name(job: RateJob) -> str:
 def _line(row: RateRow, rollouts: int) -> tuple[object, ...]:
     job = row.job
     shares = [row.symbols[name] for name in DETECTORS]
-    values = [f"{value:.2f}" for share in shares for value in (share.percent, *share.interval_percent)]
+    values = [figure for share in shares for figure in share.figures]
     axes = " ".join(job.scheme.channels[0].axes)
     return (
         f"{job.rate_bps:.2f}", job.alphabet_size, job.window_ticks, axes, rollouts, shares[0].trials, *values,

@@ -36,7 +36,7 @@ def bench_spectra(options: SpectraOptions, console: Console) -> None:
     lines = []
     for row in rows:
         shares = [row.symbols[name] for name in DETECTORS]
-        values = [f"{value:.2f}" for share in shares for value in (share.percent, *share.interval_percent)]
+        values = [figure for share in shares for figure in share.figures]
         lines.append((row.shape, shares[0].trials, *values, f"{row.capacity_bps:.2f}"))
     command = f"mtm-hil bench --spectra --rollouts {options.rollouts} --out {options.out}"
     notes = ("M = 4096, T = 100, four symbols of four robots, sigma 0.1 m/s, onset known", f"water-filled: {points}")

@@ -6,11 +6,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from hil.commands.key_schemes import scheme_notes, schemes_of
 from hil.experiments.runs.cells import CellStore
 from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.task.cost import COLUMNS, Cost, measure_costs, rows_of
 from hil.experiments.task.noise import CONDITIONS
-from mtm_onboard.protocol import MtmError, load_key
 
 
 def cost(
@@ -24,17 +24,14 @@ def cost(
     cells: Path,
 ) -> None:
     """Drive, print and, where asked, write the table. Raises MtmError for a key whose first channel no body has."""
-    schemes = {key.id: key.scheme for key in map(load_key, keys)}
-    if len(schemes) < len(keys):
-        raise MtmError("two of the keys have one name; make them with different --id")
+    schemes = schemes_of(keys)
     with CellStore(cells) as store:
         costs = measure_costs(schemes, drives, seed, store, console, workers)
     for name in schemes:
         console.print(_table(name, [cost for cost in costs if cost.scheme == name]))
     if out is not None:
         command = f"mtm-hil cost {' '.join(map(str, keys))} -n {drives} --seed {seed} --out {out}"
-        notes = tuple(f"{name}: scheme {scheme.fingerprint}" for name, scheme in schemes.items())
-        write_result_csv(out, command, COLUMNS, rows_of(costs), notes)
+        write_result_csv(out, command, COLUMNS, rows_of(costs), scheme_notes(schemes))
         print(f"wrote {out}")
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from hil.commands.key_schemes import scheme_notes, schemes_of
 from hil.experiments.runs.cells import CellStore
 from hil.experiments.runs.result_file import write_result_csv
 from hil.experiments.task.presence import Presence, measure_presence
 from hil.worlds.vehicles import arena_task
-from mtm_onboard.protocol import MtmError, load_key
 
 _COLUMNS = ("scheme", "plant", "against", "reader", "seconds", "pairs", "right", "percent", "low", "high")
 
@@ -28,16 +28,14 @@ def presence(
 ) -> None:
     """Drive, print and, where asked, write the table. Raises MtmError for a key that moves no body on its axes."""
     arena_task(plant)
-    schemes = {key.id: key.scheme for key in map(load_key, keys)}
-    if len(schemes) < len(keys):
-        raise MtmError("two of the keys have one name; make them with different --id")
+    schemes = schemes_of(keys)
     with CellStore(cells) as store:
         rows = measure_presence(schemes, plant, drives, seed, store, console, workers=workers)
     console.print(_table(rows))
     if out is not None:
         command = f"mtm-hil presence {' '.join(map(str, keys))} --plant {plant} -n {drives} --seed {seed} --out {out}"
         notes = (
-            *(f"{name}: scheme {scheme.fingerprint}" for name, scheme in schemes.items()),
+            *scheme_notes(schemes),
             "right: pairs ranked rightly (AUC); by chance 50 %",
         )
         write_result_csv(out, command, _COLUMNS, map(_line, rows), notes)
@@ -46,9 +44,8 @@ def presence(
 
 def _line(row: Presence) -> tuple[object, ...]:
     ranked = row.ranked
-    figures = (f"{value:.2f}" for value in (ranked.percent, *ranked.interval_percent))
     return (row.scheme, row.plant, row.against, row.reader, f"{row.seconds:g}", ranked.trials, ranked.successes,
-            *figures)  # fmt: skip
+            *ranked.figures)  # fmt: skip
 
 
 def _table(rows: Sequence[Presence]) -> Table:

@@ -30,13 +30,11 @@ def quiet(messages: int, seed: int, console: Console, *, workers: int | None, ou
 
 
 def _line(row: QuietRow) -> tuple[object, ...]:
-    job, shares = row.job, []
-    for share in (row.received, row.symbols):
-        shares.append([f"{value:.2f}" for value in (share.percent, *share.interval_percent)])
+    job = row.job
     return (
         job.alphabet_size, job.window_ticks, job.symbols, f"{job.bits:g}", f"{job.seconds:g}", f"{job.sigma_mps:g}",
-        f"{TURN_RADPM * job.sigma_mps:g}", row.received.trials, *shares[0], row.wrong, *shares[1],
-        f"{row.median_bits:.1f}",
+        f"{TURN_RADPM * job.sigma_mps:g}", row.received.trials, *row.received.figures, row.wrong,
+        *row.symbols.figures, f"{row.median_bits:.1f}",
     )  # fmt: skip
 
 

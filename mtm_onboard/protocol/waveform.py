@@ -41,7 +41,11 @@ def tone_bins(window_ticks: int, rate_hz: float, band_hz: tuple[float, float]) -
 
 def channel_tones(scheme: Scheme, channel: Channel) -> tuple[Floats, Floats]:
     """Each tone's frequency in hertz, and its mean power beside that of an even share, of mean 1: (K,) each."""
-    ticks = scheme.window_ticks(channel)
+    return band_tones(scheme, scheme.window_ticks(channel))
+
+
+def band_tones(scheme: Scheme, ticks: int) -> tuple[Floats, Floats]:
+    """As `channel_tones`, of a stretch of so many ticks."""
     tones_hz = tone_bins(ticks, scheme.rate_hz, scheme.band_hz) * scheme.rate_hz / ticks
     if scheme.spectrum is None:
         return tones_hz, np.ones(len(tones_hz))

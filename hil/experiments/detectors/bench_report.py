@@ -96,7 +96,7 @@ def _csv_row(row: Row) -> tuple[object, ...]:
 
 
 def _share_fields(share: Proportion) -> tuple[object, ...]:
-    return share.trials, share.successes, *(f"{value:.2f}" for value in (share.percent, *share.interval_percent))
+    return share.trials, share.successes, *share.figures
 
 
 def _with_interval(proportion: Proportion) -> str:

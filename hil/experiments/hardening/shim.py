@@ -76,5 +76,4 @@ def write_csv(path: Path, comparison: Comparison, command: str, notes: Sequence[
 
 
 def _csv_row(name: str, share: Proportion) -> tuple[object, ...]:
-    percents = (f"{percent:.2f}" for percent in (share.percent, *share.interval_percent))
-    return name, JOB.window_ticks, share.trials, share.successes, *percents
+    return name, JOB.window_ticks, share.trials, share.successes, *share.figures

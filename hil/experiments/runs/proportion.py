@@ -23,6 +23,12 @@ class Proportion:
         low, high = clopper_pearson(self.successes, self.trials)
         return 100.0 * low, 100.0 * high
 
+    @property
+    def figures(self) -> tuple[str, str, str]:
+        """The percentage and its interval as tables of results have them, to two decimals."""
+        low, high = self.interval_percent
+        return f"{self.percent:.2f}", f"{low:.2f}", f"{high:.2f}"
+
     def __str__(self) -> str:
         low, high = self.interval_percent
         return f"{self.percent:.1f} [{low:.0f}-{high:.0f}]"

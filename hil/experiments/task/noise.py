@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from mtm_audit.model.track import Floats
 from mtm_onboard.model.velocity import AXES, BodyVelocity
 from mtm_onboard.protocol import Channel, Codebook, MtmError, Scheme
-from mtm_onboard.protocol.spectrum import tone_powers
-from mtm_onboard.protocol.waveform import tone_bins
+from mtm_onboard.protocol.waveform import band_tones, channel_tones, evaluate_window, tone_bins
 from mtm_onboard.runtime.modulator import Modulator
 
 CLEAN, WHITE, SAME_BAND, SAME_LAW, KEYED = "clean", "white", "same band", "same law", "keyed"
@@ -68,7 +67,7 @@ def _of_the_band(scheme: Scheme, channels: Sequence[Channel], draw: np.random.Ge
     """Stationary Gaussian noise, which knows of no windows."""
     count = _longest_ticks(scheme)
     tones = tone_bins(count, scheme.rate_hz, scheme.band_hz)
-    powers = _tone_powers(scheme, tones * scheme.rate_hz / count)
+    _, powers = band_tones(scheme, count)
 
     def drawn() -> Floats:
         amplitudes = np.sqrt(powers / len(tones)) * draw.rayleigh(size=len(tones))
@@ -84,7 +83,7 @@ def _of_the_law(scheme: Scheme, channels: Sequence[Channel], draw: np.random.Gen
     def drawn(channel: Channel) -> Floats:
         count = scheme.window_ticks(channel)
         tones = tone_bins(count, scheme.rate_hz, scheme.band_hz)
-        roots = np.sqrt(_tone_powers(scheme, tones * scheme.rate_hz / count))
+        roots = np.sqrt(channel_tones(scheme, channel)[1])
         windows = []
         for _ in range(-(-longest // count)):
             amplitudes = draw.rayleigh(size=len(tones))
@@ -106,15 +105,7 @@ def _added(channels: Sequence[Channel], count: int, drawn: Callable[[Channel], F
 
 def _sum_of_tones(count: int, bins: NDArray[np.int64], amplitudes: Floats, draw: np.random.Generator) -> Floats:
     """(count,): tones of these bins and amplitudes with phases at random."""
-    tones = np.zeros(count // 2 + 1, dtype=np.complex128)
-    tones[bins] = amplitudes * np.exp(1j * draw.uniform(0.0, 2.0 * np.pi, len(bins))) * count / 2.0
-    return np.asarray(np.fft.irfft(tones, count))
-
-
-def _tone_powers(scheme: Scheme, tones_hz: Floats) -> Floats:
-    if scheme.spectrum is None:
-        return np.ones(len(tones_hz))
-    return tone_powers(scheme.spectrum, np.asarray(tones_hz, dtype=np.float64))
+    return evaluate_window(amplitudes * np.exp(1j * draw.uniform(0.0, 2.0 * np.pi, len(bins))), bins, count)
 
 
 def _longest_ticks(scheme: Scheme) -> int:

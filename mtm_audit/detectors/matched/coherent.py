@@ -236,10 +236,11 @@ def _starting_gains(observed: int, axes: int) -> NDArray[np.float32]:
     return np.stack(starts).astype(np.float32) * np.float32(np.sqrt(GAIN_VARIANCE))
 
 
-def _ratios(information: Floats, energy: Floats, gains: Floats, relief: Relief) -> Floats:
-    """Log-likelihood ratios (hypotheses, windows, kept, starts); `gains` (hypotheses, starts, pairs)."""
+def _ratios(information: Floats, energy: Floats, gains: Floats, factors: Floats) -> Floats:
+    """Log-likelihood ratios (hypotheses, windows, kept, starts); `gains` and the relief's `factors` (hypotheses,
+    starts, pairs).
+    """
     hypotheses, windows, kept, pairs = information.shape
-    factors = relief.factors(gains)
     pulled, spent = (gains * factors).transpose(0, 2, 1), (gains**2 * factors).transpose(0, 2, 1)
     linear = (information.reshape(hypotheses, windows * kept, pairs) @ pulled).reshape(hypotheses, windows, kept, -1)
     return np.asarray(linear - 0.5 * (energy @ spent)[:, :, None])
@@ -259,7 +260,7 @@ def _fit(
     information: Floats, energy: Floats, gains: Floats, count: int, visible: Bools, relief: Relief, by_chance: Floats
 ) -> Floats:  # fmt: skip
     """Log-likelihood of the windows seen plus log prior of the gains, (hypotheses, starts)."""
-    ratios = _ratios(information, energy, gains, relief)
+    ratios = _ratios(information, energy, gains, relief.factors(gains))
     carried = _log_mixture(ratios, count, by_chance) - np.log(2.0)
     fit = np.where(visible, carried, 0.0).sum(axis=1) - 0.5 * np.sum(gains**2, axis=2) / GAIN_VARIANCE
     return np.asarray(fit)
@@ -267,11 +268,11 @@ def _fit(
 
 def _better_gains(information: Floats, energy: Floats, gains: Floats, count: int, relief: Relief) -> Floats:
     """One step of expectation-maximisation."""
-    ratios = _ratios(information, energy, gains, relief)
+    factors = relief.factors(gains)
+    ratios = _ratios(information, energy, gains, factors)
     belief = np.exp(ratios - _log_mixture(ratios, count)[:, :, None]) / count
     hypotheses, windows, kept, starts = belief.shape
     turned = belief.reshape(hypotheses, windows * kept, starts).transpose(0, 2, 1)
-    factors = relief.factors(gains)
     pulled = turned @ information.reshape(hypotheses, windows * kept, -1) * factors
     weight = belief.sum(axis=2).transpose(0, 2, 1) @ energy * factors + 1.0 / GAIN_VARIANCE
     return np.asarray(pulled / weight)
