@@ -115,7 +115,7 @@ def _answer(heard: Heard, asked: Sequence[tuple[Sequence[Tones], _Seen]], step_s
             [relief.by_chance(*each, own) for each, own in zip(shown, np.split(gains, ends), strict=True)]
         )
 
-    gains = np.repeat(_starting_gains(observed, axes)[None], len(information), axis=0)
+    gains = np.repeat(starting_gains(observed, axes)[None], len(information), axis=0)
     for _ in range(_FIRST_ROUNDS):
         gains = _better_gains(information, pairs, gains, count, relief)
     fits = _fit(information, pairs, gains, count, visible, relief, by_chance(gains))
@@ -221,7 +221,7 @@ def _strongest_by_cell(heard: Heard, cells: NDArray[np.int64], tones: Tones) -> 
     return result
 
 
-def _starting_gains(observed: int, axes: int) -> NDArray[np.float32]:
+def starting_gains(observed: int, axes: int) -> NDArray[np.float32]:
     """Quarter turns of a plain camera and of a mirrored one, at the prior's magnitude: (starts, pairs of axes)."""
     plain = np.eye(observed, axes)
     if observed == 1:

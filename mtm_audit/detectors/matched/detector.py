@@ -9,8 +9,9 @@ from scipy.special import softmax
 from mtm_audit.detectors.base import ChannelReading, Observation, Reading, StrengthLaw
 from mtm_audit.detectors.matched.byclock import Found
 from mtm_audit.detectors.matched.correlate import Prepared, prepare
-from mtm_audit.detectors.matched.estimate import Estimate, estimate, fit_recording_noise
+from mtm_audit.detectors.matched.estimate import Estimate, estimate, first_evidence, fit_recording_noise
 from mtm_audit.detectors.matched.fleet import Member, share_timings
+from mtm_audit.detectors.matched.hypotheses import log_rate_prior
 from mtm_audit.detectors.matched.kinds import elsewhere, reading_order
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
 from mtm_audit.detectors.matched.noise import principal_axes
@@ -24,6 +25,9 @@ from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
 from mtm_onboard.protocol.scheme import Channel
+
+# How much likelier a clock is that keeps its rate than the one rate, of all that a search tries, which fits best.
+_NOMINAL_NATS = 2.0
 
 
 class MatchedDetector:
@@ -121,7 +125,7 @@ class MatchedDetector:
         moved = [prepared[number].motion for number in numbers]
         own = [channels[number] for number in numbers]
         noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
-        timings = [searched[number][0].timing for number in numbers]
+        timings = self._likeliest(codebook, channels, prepared, numbers, searched, onset, others)
         shown = [shown_numbers(codebook, *each, onset) for each in zip(own, moved, timings, strict=True)]
         windows = _all_windows(codebook, own, moved, timings, shown)
         names = [channel.name for channel in own]
@@ -140,6 +144,55 @@ class MatchedDetector:
                 reading, softmax(reading.scores, axis=1), reading.window_scores, strengths[1:], prepared[number]
             )
         return readings
+
+    def _likeliest(
+        self,
+        codebook: Codebook,
+        channels: dict[int, Channel],
+        prepared: dict[int, Prepared],
+        numbers: Sequence[int],
+        searched: dict[int, list[Found]],
+        onset: Onset,
+        others: Mapping[str, Reading],
+    ) -> list[Timing]:
+        """The timings that were found or, where the onset is known, those near it which all plants explain best.
+
+        The search knows one plant, and lays windows late for a robot that lags otherwise.
+        """
+        found = [searched[number][0].timing for number in numbers]
+        if not isinstance(onset, int | float):
+            return found
+        moved, own = [prepared[number].motion for number in numbers], [channels[number] for number in numbers]
+        noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
+        names = [channel.name for channel in own]
+        best, most = found, -np.inf
+        for timings in _near_known(found, float(onset), codebook.scheme.rate_hz):
+            shown = [shown_numbers(codebook, *each, onset) for each in zip(own, moved, timings, strict=True)]
+            if not all(map(len, shown)):
+                continue
+            windows = _all_windows(codebook, own, moved, timings, shown)
+            beside = elsewhere(windows, names, timings, others)
+            evidence = first_evidence(windows, moved, noise, self._profile, beside)
+            evidence += _log_clock_prior(timings, codebook.scheme.rate_hz)
+            if evidence > most:
+                best, most = timings, evidence
+        return best
+
+
+def _near_known(found: Sequence[Timing], onset_s: float, nominal_hz: float) -> list[list[Timing]]:
+    """The timings as found, with the onset as it is known, at the nominal rate, and with both."""
+    return [
+        list(found),
+        [replace(timing, onset_s=onset_s) for timing in found],
+        [replace(timing, rate_hz=nominal_hz) for timing in found],
+        [Timing(onset_s, nominal_hz) for _ in found],
+    ]
+
+
+def _log_clock_prior(timings: Sequence[Timing], nominal_hz: float) -> float:
+    rates_hz = np.array([timing.rate_hz for timing in timings])
+    prior = float(np.mean(log_rate_prior(rates_hz, nominal_hz)))
+    return prior + (_NOMINAL_NATS if np.all(rates_hz == nominal_hz) else 0.0)
 
 
 def _motions(glimpses: Sequence[Glimpse], codebook: Codebook) -> tuple[dict[int, Motion], dict[int, MtmError]]:

@@ -10,11 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import log_softmax, softmax
 
 from mtm_audit.detectors.matched.candidates import WHOLE
 from mtm_audit.detectors.matched.evidence import GAIN_VARIANCE, half_log_evidence, log_sum_exp
 from mtm_audit.detectors.matched.first_pass import KEPT, first_pass
+from mtm_audit.detectors.matched.joint import Together, decide_together
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import NoiseModel, fit_noise_by_axis, model_order, whitened_from_silence
 from mtm_audit.detectors.matched.outliers import outlier_correction
@@ -89,11 +91,10 @@ def estimate(
     ratios: Floats = np.empty((len(windows), count), dtype=np.float32 if count > WHOLE else np.float64)
     judged = _first_look(windows, motions, noise, first_prior, elsewhere, ratios)
     for look in range(_ROUNDS):
-        _believe(judged)
         found = _all_statistics(judged, motions, noise)
-        for _ in range(2):
-            hypotheses = _judge(judged, found, prior)
-            _believe(judged)
+        _believe_together(judged, found, prior)
+        hypotheses = _judge(judged, found, prior)
+        _believe(judged)
         if look == _ROUNDS - 1:
             _doubt_outliers(judged, found, hypotheses, motions, noise)
         _expect_signals(judged, hypotheses, noise)
@@ -105,6 +106,19 @@ def estimate(
         _tell_all_candidates(state)
     signals = tuple(state.signal for state in judged)
     return Estimate(ratios, signals, tuple(residuals), noise, _shared_plants(judged, found, prior))
+
+
+def first_evidence(
+    windows: Sequence[Window],
+    motions: Sequence[Motion],
+    noise: NoiseModel,
+    profile: PlantProfile | None = None,
+    elsewhere: Sequence[Floats] | None = None,
+) -> float:
+    """How much, in nats, windows laid so speak for a message at a first look; arguments as of `estimate`."""
+    ratios: Floats = np.empty((len(windows), len(windows[0].tones)))
+    judged = _first_look(windows, motions, noise, log_prior(profile, COARSE), elsewhere, ratios)
+    return _believe_together(judged, _all_statistics(judged, motions, noise), log_prior(profile, FINE))
 
 
 def _shared_plants(judged: Sequence[_Judged], found: Sequence[Statistics], prior: Floats) -> Floats:
@@ -172,7 +186,7 @@ def _keep_best(judged: Sequence[_Judged]) -> None:
 def _groups(judged: Sequence[_Judged]) -> list[list[_Judged]]:
     groups: dict[tuple[int, int], list[_Judged]] = {}
     for state in judged:
-        groups.setdefault((state.window.observation, state.window.group), []).append(state)
+        groups.setdefault(_symbol_of(state), []).append(state)
     return list(groups.values())
 
 
@@ -182,6 +196,44 @@ def _believe(judged: Sequence[_Judged]) -> None:
         belief = np.exp(total - log_sum_exp(total, axis=0))
         for state in members:
             state.belief = belief
+
+
+def _believe_together(judged: Sequence[_Judged], found: Sequence[Statistics], prior: Floats) -> float:
+    """Believe what windows say together: those of each observation, or of all where these agree better as one.
+
+    Returns the evidence, nats.
+    """
+    observed = np.array([state.window.observation for state in judged])
+    parts = [np.flatnonzero(observed == number) for number in np.unique(observed)]
+    apart = [_together(judged, found, part, prior) for part in parts]
+    if len(parts) > 1:
+        everything = np.arange(len(judged))
+        as_one = _together(judged, found, everything, prior)
+        if as_one.evidence > sum(each.evidence for each in apart):
+            parts, apart = [everything], [as_one]
+    for part, each in zip(parts, apart, strict=True):
+        for index, belief in zip(part.tolist(), each.beliefs, strict=True):
+            judged[index].belief = belief
+    return sum(each.evidence for each in apart)
+
+
+def _together(
+    judged: Sequence[_Judged], found: Sequence[Statistics], chosen: NDArray[np.int64], prior: Floats
+) -> Together:
+    states = [judged[index] for index in chosen.tolist()]
+    symbols = {key: number for number, key in enumerate(dict.fromkeys(map(_symbol_of, states)))}
+    return decide_together(
+        [found[index] for index in chosen.tolist()],
+        [state.elsewhere[state.kept] for state in states],
+        [symbols[_symbol_of(state)] for state in states],
+        len(states[0].overview),
+        prior,
+    )
+
+
+def _symbol_of(state: _Judged) -> tuple[int, int]:
+    """Windows for which this is the same repeat one symbol."""
+    return state.window.observation, state.window.group
 
 
 def _all_statistics(judged: Sequence[_Judged], motions: Sequence[Motion], noise: NoiseModel) -> list[Statistics]:
