@@ -1,15 +1,17 @@
 """What the robot and the camera may do to a waveform: a family of short filters, and tones passed through them.
 
 A member is a pure delay and a first-order lag; some give back after a while what they have followed, as a robot does
-whose controller holds a place against the noise; some are second-order, as a speed loop or a body that tilts. Gains,
-signs and mixing of axes are left to the estimate. Impulse responses are sampled every hundredth of a second.
+whose controller holds a place against the noise; some are second-order, as a speed loop or a body that tilts; some lack
+a part of the band, as a speed loop does whose filter keeps a resonance quiet. Gains, signs and mixing of axes are left
+to the estimate. Impulse responses are sampled every hundredth of a second.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import signal
 
 from mtm_audit.model.track import Floats
 
@@ -26,12 +28,13 @@ class Plants:
     """A family of impulse responses: `taps` (plants, taps), with the delay and lag of each.
 
     `returns_s` is the time constant with which a plant gives back what it follows, infinite where it does not and the
-    taps' sum is 1.
+    taps' sum is 1; `notches_hz` where the notch filter before it lets nothing pass, infinite where there is none.
     """
 
     delays_s: Floats
     lags_s: Floats
     returns_s: Floats
+    notches_hz: Floats
     taps: Floats
 
 
@@ -41,7 +44,8 @@ def plant_family(delays_s: Floats, lags_s: Floats) -> Plants:
     instants_s = np.arange(0.0, MEMORY_S, TAP_S) + TAP_S / 2.0
     since_s = instants_s[None, :] - delays[:, None]
     taps = np.where(since_s >= 0.0, np.exp(-np.maximum(since_s, 0.0) / lags[:, None]), 0.0)
-    return Plants(delays, lags, np.full(len(delays), np.inf), taps / taps.sum(axis=1, keepdims=True))
+    none = np.full(len(delays), np.inf)
+    return Plants(delays, lags, none, none, taps / taps.sum(axis=1, keepdims=True))
 
 
 def returning(family: Plants, returns_s: Sequence[float]) -> Plants:
@@ -53,7 +57,28 @@ def returning(family: Plants, returns_s: Sequence[float]) -> Plants:
         taps += [own - np.convolve(own, given_back)[: len(own)] for own in family.taps]
     times, count = len(returns_s), len(family.taps)
     return Plants(np.tile(family.delays_s, times), np.tile(family.lags_s, times), np.repeat(returns_s, count),
-                  np.array(taps))  # fmt: skip
+                  np.tile(family.notches_hz, times), np.array(taps))  # fmt: skip
+
+
+def notched(family: Plants, notches_hz: Sequence[float], quality: float) -> Plants:
+    """The family's plants behind a second-order notch filter, once for each of its frequencies."""
+    impulse = np.zeros(family.taps.shape[1])
+    impulse[0] = 1.0
+    taps = []
+    for notch_hz in notches_hz:
+        passed = signal.lfilter(*signal.iirnotch(notch_hz, quality, fs=1.0 / TAP_S), impulse)
+        taps += [np.convolve(own, passed)[: len(own)] for own in family.taps]
+    times, count = len(notches_hz), len(family.taps)
+    return Plants(np.tile(family.delays_s, times), np.tile(family.lags_s, times), np.tile(family.returns_s, times),
+                  np.repeat(notches_hz, count), np.array(taps))  # fmt: skip
+
+
+def without_notches(family: Plants) -> Plants:
+    """The same plants, those with a notch by their delay and lag alone."""
+    taps = family.taps.copy()
+    for plant in np.flatnonzero(np.isfinite(family.notches_hz)):
+        taps[plant] = plant_family(family.delays_s[plant, None], family.lags_s[plant, None]).taps[0]
+    return replace(family, notches_hz=np.full(len(taps), np.inf), taps=taps)
 
 
 def second_order(naturals_hz: Sequence[float], damping: float) -> Plants:
@@ -66,7 +91,8 @@ def second_order(naturals_hz: Sequence[float], damping: float) -> Plants:
     swings = np.exp(-damping * rates[:, None] * instants_s) * np.sin(
         rates[:, None] * np.sqrt(1.0 - damping**2) * instants_s
     )
-    return Plants(np.zeros(len(rates)), 2.0 * damping / rates, np.full(len(rates), np.inf),
+    none = np.full(len(rates), np.inf)
+    return Plants(np.zeros(len(rates)), 2.0 * damping / rates, none, none,
                   swings / swings.sum(axis=1, keepdims=True))  # fmt: skip
 
 
@@ -79,7 +105,9 @@ def joined(*families: Plants) -> Plants:
 # a third, for which a few delays and lags will do.
 _RETURNING = returning(plant_family(np.array([0.02, 0.10]), np.array([0.06, 0.28])), (0.1, 0.3))
 COARSE = joined(plant_family(np.array([0.02, 0.06, 0.10, 0.14]), np.array([0.06, 0.13, 0.28])), _RETURNING)
-FINE = joined(plant_family(np.arange(0.0, 0.17, 0.03), np.array([0.05, 0.1, 0.2, 0.4])), _RETURNING)
+# Notches are so broad that four of them leave no part of the band to none.
+_NOTCHED = notched(plant_family(np.array([0.03, 0.09]), np.array([0.1, 0.2])), (1.0, 1.5, 2.2, 3.2), 0.8)
+FINE = joined(plant_family(np.arange(0.0, 0.17, 0.03), np.array([0.05, 0.1, 0.2, 0.4])), _RETURNING, _NOTCHED)
 
 
 def tone_responses(plants: Plants, tones_hz: Floats, since_start_s: Floats, length_s: float) -> Complexes:

@@ -1,3 +1,5 @@
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -6,7 +8,9 @@ from mtm_audit.detectors.matched.plants import (
     FINE,
     MEMORY_S,
     TAP_S,
+    Plants,
     joined,
+    notched,
     plant_family,
     returning,
     tone_responses,
@@ -14,6 +18,8 @@ from mtm_audit.detectors.matched.plants import (
 
 TONES_HZ = np.array([0.5, 1.7, 4.6])
 LENGTH_S = 2.0
+# Those whose response the quadrature below knows.
+UNNOTCHED = Plants(**{field.name: getattr(FINE, field.name)[np.isinf(FINE.notches_hz)] for field in fields(Plants)})
 STEP_S = 0.0005
 
 
@@ -37,7 +43,7 @@ def by_quadrature(delay_s, lag_s, return_s, tone_hz, instant_s):
         pytest.param([2.02, 2.1, 2.33, 2.49], id="tail"),
     ],
 )
-@pytest.mark.parametrize("family", [COARSE, FINE], ids=["coarse", "fine"])
+@pytest.mark.parametrize("family", [COARSE, UNNOTCHED], ids=["coarse", "fine"])
 def test_tones_through_plants_are_the_convolution_integral(family, instants_s):
     heard = tone_responses(family, TONES_HZ, np.array(instants_s), LENGTH_S)
     assert heard.shape == (len(family.taps), 3, len(instants_s))
@@ -77,6 +83,17 @@ def test_what_returns_follows_at_once_and_not_for_good():
     assert np.all(heard[:, 0] > 0.2)
     assert np.all(np.abs(heard[:, 1]) < [0.02, 0.12])
     assert family.taps[0] == pytest.approx(returning(plain, (0.1,)).taps[0])
+
+
+def test_what_is_notched_lacks_that_part_of_the_band():
+    plain = plant_family(np.array([0.02]), np.array([0.06]))
+    family = notched(plain, (1.0, 3.2), 0.8)
+    assert family.notches_hz.tolist() == [1.0, 3.2]
+    settled = np.array([MEMORY_S])
+    heard = np.abs(tone_responses(family, np.array([1.0, 3.2]), settled, LENGTH_S)[:, :, 0])
+    whole = np.abs(tone_responses(plain, np.array([1.0, 3.2]), settled, LENGTH_S)[0, :, 0])
+    assert np.all(np.diag(heard) < 0.1 * whole)
+    assert np.all(heard[::-1].diagonal() > 0.6 * whole)
 
 
 def test_joined_families_are_one_after_the_other():
