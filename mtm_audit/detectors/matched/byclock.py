@@ -18,9 +18,12 @@ from mtm_audit.model.timing import OnsetRange, Timing
 from mtm_audit.model.track import Floats
 
 _CHUNK = 256
-# Rates that move the recording's ends by half a cell against its middle, and starts in half cells.
+# Starts are weighed every half cell, since a message of many symbols is lost between whole ones: of its highest tone a
+# cell is a fifth of a period.
+_HALF_CELL = 0.5
+# Rates that move the recording's ends by half a cell against its middle, and starts in quarter cells.
 _RATE_STEPS = np.arange(-6, 7)
-_HALF_CELLS = np.arange(-2, 3) / 2.0
+_QUARTER_CELLS = np.arange(-2, 3) / 4.0
 
 
 @dataclass(frozen=True)
@@ -53,10 +56,9 @@ def starts_by_clock(
     `heard` at the nominal rate; `tones` of the windows of each codebook, as many for all.
     """
     step_s = place.motion.step_s
-    # Whole cells, so that nothing that was heard needs to be turned.
     first = np.floor((bounds.low_s - place.motion.start_s) / step_s)
-    count = int(np.ceil((bounds.high_s - bounds.low_s) / step_s)) + 2
-    onsets_s = place.motion.start_s + (first + np.arange(count)) * step_s
+    count = int(np.ceil((bounds.high_s - bounds.low_s) / step_s / _HALF_CELL)) + 3
+    onsets_s = place.motion.start_s + (first + np.arange(count) * _HALF_CELL) * step_s
     evidences: list[list[Floats]] = [[] for _ in tones]
     chunks = np.array_split(onsets_s, -(-count // _CHUNK))
     for done, chunk in enumerate(chunks):
@@ -95,7 +97,7 @@ def _around(place: Place, start_s: float) -> tuple[Floats, Floats]:
     rates_hz = place.nominal_hz * (1.0 + _RATE_STEPS * motion.step_s / lasts_s)
     middle = np.rint((motion.start_s + lasts_s / 2.0 - start_s) / length_s)
     onsets_s = start_s + middle * (length_s - place.ticks / rates_hz)
-    return (onsets_s[:, None] + _HALF_CELLS * motion.step_s).ravel(), np.repeat(rates_hz, len(_HALF_CELLS))
+    return (onsets_s[:, None] + _QUARTER_CELLS * motion.step_s).ravel(), np.repeat(rates_hz, len(_QUARTER_CELLS))
 
 
 def _best(evidence: Floats, onsets_s: Floats, rates_hz: Floats) -> Found:
