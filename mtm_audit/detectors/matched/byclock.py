@@ -12,7 +12,7 @@ import numpy as np
 from mtm_audit.detectors.matched.candidates import Tones
 from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
 from mtm_audit.detectors.matched.correlate import Heard
-from mtm_audit.detectors.matched.hypotheses import log_rate_prior
+from mtm_audit.detectors.matched.hypotheses import log_clock_prior
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.model.timing import OnsetRange, Timing
 from mtm_audit.model.track import Floats
@@ -74,7 +74,7 @@ def starts_by_clock(
         near = _weigh(
             heard, place, [t for t, own in zip(tones, starts_s, strict=True) if own == start_s], onsets, rates_hz
         )
-        prior = log_rate_prior(rates_hz, place.nominal_hz)
+        prior = log_clock_prior(rates_hz, place.nominal_hz)
         found[start_s] = [_best(evidence + prior, onsets, rates_hz) for evidence in near]
     return [found[start_s].pop(0) for start_s in starts_s]
 
