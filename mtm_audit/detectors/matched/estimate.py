@@ -45,6 +45,7 @@ class _Judged:
     # alphabet are in single precision, in which they are weighed.
     overview: Floats
     belief: Floats  # (L,) probabilities of the kept candidates, all repeats taken together
+    by_plant: Floats  # (L, plants) log-likelihood ratios of the kept candidates under each plant of all axes alike
     signal: Floats  # (observed axes, n) expected contribution to the motion
     elsewhere: Floats  # (M,) log-likelihood ratios of all candidates by what is not in this motion
 
@@ -91,6 +92,8 @@ def estimate(
     for look in range(_ROUNDS):
         _believe(judged)
         found = _all_statistics(judged, motions, noise)
+        if look == 0:
+            _judge_alone(judged, found)
         for _ in range(2):
             hypotheses = _judge(judged, found, prior)
             _believe(judged)
@@ -110,9 +113,10 @@ def estimate(
 def _shared_plants(judged: Sequence[_Judged], found: Sequence[Statistics], prior: Floats) -> Floats:
     """Probabilities (plants,) of one plant for all observations, whose gains are their own."""
     total = prior.copy()
-    for precision, information in _totals(judged, _said(judged, found)).values():
+    for said in _totals(judged, _said_by_plant(judged, found)).values():
+        information = np.asarray(said.information)
         axes = information.shape[-1]
-        total += half_log_evidence(np.eye(axes) / GAIN_VARIANCE + precision, information).sum(axis=0)
+        total += half_log_evidence(np.eye(axes) / GAIN_VARIANCE + said.precision, information).sum(axis=0) + said.doubt
     return np.asarray(np.exp(total - log_sum_exp(total, axis=0)))
 
 
@@ -153,7 +157,9 @@ def _first_look(
             kept, overviews[index] = ratios[found.kept], ratios
             rows = response_rows(window, FINE)
             tones = window.tones.of(found.kept)
-            judged[index] = _Judged(window, found.kept, tones, rows, kept, overviews[index], kept, silent, others)
+            judged[index] = _Judged(
+                window, found.kept, tones, rows, kept, overviews[index], kept, _alike(kept), silent, others
+            )
     if elsewhere is not None:
         _keep_best(list(judged.values()))
     return [judged[index] for index in range(len(windows))]
@@ -166,7 +172,12 @@ def _keep_best(judged: Sequence[_Judged]) -> None:
         kept = np.argsort(-total)[:KEPT]
         for state in members:
             state.kept, state.ratios = kept, state.overview[kept].astype(np.float64)
-            state.tones = state.window.tones.of(kept)
+            state.tones, state.by_plant = state.window.tones.of(kept), _alike(state.ratios)
+
+
+def _alike(ratios: Floats) -> Floats:
+    """Ratios (L,) that are the same under each plant: (L, plants)."""
+    return np.repeat(ratios[:, None], len(FINE.taps), axis=1)
 
 
 def _groups(judged: Sequence[_Judged]) -> list[list[_Judged]]:
@@ -206,10 +217,55 @@ class _Hypothesis:
     known: Floats
 
 
-def _said(judged: Sequence[_Judged], found: Sequence[Statistics]) -> list[tuple[Floats, Floats]]:
-    """What each window says about the gains under each plant: precision and information, expected over candidates."""
+@dataclass(frozen=True)
+class _Said:
+    """What windows say about the gains under each plant: `precision` (axes, plants, A, A) and `information` (axes,
+    plants, A), expected over candidates; `doubt` (plants,) what the candidates leave open of that, nats.
+    """
+
+    precision: Floats | float = 0.0
+    information: Floats | float = 0.0
+    doubt: Floats | float = 0.0
+
+    def __add__(self, other: "_Said") -> "_Said":
+        return _Said(self.precision + other.precision, self.information + other.information, self.doubt + other.doubt)
+
+    def __sub__(self, other: "_Said") -> "_Said":
+        return _Said(self.precision - other.precision, self.information - other.information, self.doubt - other.doubt)
+
+
+def _judge_alone(judged: Sequence[_Judged], found: Sequence[Statistics]) -> None:
+    """Each window's candidates under each plant, its gains unknown to all others."""
+    for state, data in zip(judged, found, strict=True):
+        axes = data.information.shape[-1]
+        state.by_plant = half_log_evidence(np.eye(axes) / GAIN_VARIANCE + data.precision, data.information).sum(axis=0)
+
+
+def _said_by_plant(judged: Sequence[_Judged], found: Sequence[Statistics]) -> list[_Said]:
+    """What each window says where all axes are alike. Each plant has beliefs of its own: under beliefs that all share,
+    doubt would speak for plants that hardly move.
+    """
+    beliefs = {}
+    for members in _groups(judged):
+        total = np.sum([state.by_plant + state.elsewhere[state.kept][:, None] for state in members], axis=0)
+        logs = total - log_sum_exp(total, axis=0)
+        belief = np.exp(logs)
+        doubt = -np.sum(belief * logs, axis=0) / len(members)
+        beliefs.update({id(state): (belief, doubt) for state in members})
     return [
-        (
+        _Said(
+            np.einsum("lp,dlpab->dpab", belief, data.precision),
+            np.einsum("lp,dlpa->dpa", belief, data.information),
+            doubt,
+        )
+        for (belief, doubt), data in zip([beliefs[id(state)] for state in judged], found, strict=True)
+    ]
+
+
+def _said(judged: Sequence[_Judged], found: Sequence[Statistics]) -> list[_Said]:
+    """What each window says about the gains under each plant, whatever the plant of other axes is."""
+    return [
+        _Said(
             np.einsum("l,dlpab->dpab", state.belief, data.precision),
             np.einsum("l,dlpa->dpa", state.belief, data.information),
         )
@@ -217,54 +273,69 @@ def _said(judged: Sequence[_Judged], found: Sequence[Statistics]) -> list[tuple[
     ]
 
 
-def _totals(judged: Sequence[_Judged], said: Sequence[tuple[Floats, Floats]]) -> dict[int, tuple[Floats, Floats]]:
+def _totals(judged: Sequence[_Judged], said: Sequence[_Said]) -> dict[int, _Said]:
     """The same of each observation, all its windows together."""
-    totals: dict[int, tuple[Floats, Floats]] = {}
+    totals: dict[int, _Said] = {}
     for state, entry in zip(judged, said, strict=True):
-        before = totals.get(state.window.observation, (0.0, 0.0))
-        totals[state.window.observation] = (before[0] + entry[0], before[1] + entry[1])
+        totals[state.window.observation] = totals.get(state.window.observation, _Said()) + entry
     return totals
 
 
 def _judge(judged: Sequence[_Judged], found: Sequence[Statistics], prior: Floats) -> list[list[_Hypothesis]]:
     """Refresh every window's ratios under the plant that the others show; returns the hypotheses used."""
-    said = _said(judged, found)
-    totals = (np.sum([entry[0] for entry in said], axis=0), np.sum([entry[1] for entry in said], axis=0))
-    own_totals = _totals(judged, said)
+    alike, apart = _said_by_plant(judged, found), _said(judged, found)
+    own = _totals(judged, alike), _totals(judged, apart)
+    together = sum(own[0].values(), _Said()), sum(own[1].values(), _Said())
     results = []
-    for state, data, entry in zip(judged, found, said, strict=True):
-        sources = [own_totals[state.window.observation]]
-        if len(own_totals) > 1:
-            sources.append(totals)
-        hypotheses = [
-            hypothesis
-            for source in sources
-            for hypothesis in _under(data, source[0] - entry[0], source[1] - entry[1], prior)
-        ]
+    for state, data, *entries in zip(judged, found, alike, apart, strict=True):
+        sources = [tuple(totals[state.window.observation] for totals in own)]
+        if len(own[0]) > 1:
+            sources.append(together)
+        hypotheses: list[_Hypothesis] = []
+        by_plant = []
+        for source in sources:
+            hypothesis, gained = _under_alike(data, source[0] - entries[0], prior)
+            hypotheses.append(hypothesis)
+            by_plant.append(gained)
+            if len(data.information) > 1:
+                hypotheses.append(_under_apart(data, source[1] - entries[1], prior))
         ratios = np.stack([hypothesis.ratios for hypothesis in hypotheses])
         state.ratios = log_sum_exp(ratios, axis=0) - np.log(len(ratios))
+        state.by_plant = log_sum_exp(np.stack(by_plant), axis=0)
         results.append(hypotheses)
     return results
 
 
-def _under(data: Statistics, precision: Floats, information: Floats, prior: Floats) -> list[_Hypothesis]:
-    """What follows from a plant known by `precision` (axes, plants, A, A), `information` (axes, plants, A) and the log
-    `prior` (plants,): once for all observed axes alike, and with more than one of them once for each apart.
+def _under_alike(data: Statistics, said: _Said, prior: Floats) -> tuple[_Hypothesis, Floats]:
+    """What follows from a plant that all observed axes share and of which others have `said` so much, with the log
+    `prior` (plants,); and the ratios (L, plants) under each plant.
     """
-    axes = information.shape[-1]
-    known = np.eye(axes) / GAIN_VARIANCE + precision
+    known, gains, alone, gained = _gained(data, said)
+    by_plant = gained.sum(axis=0)
+    shared = np.asarray(log_softmax(alone.sum(axis=0) + said.doubt + prior))
+    ratios = log_sum_exp(by_plant + shared, axis=1)
+    return _Hypothesis(ratios, np.broadcast_to(np.exp(shared), alone.shape), gains, known), by_plant
+
+
+def _under_apart(data: Statistics, said: _Said, prior: Floats) -> _Hypothesis:
+    """The same where each observed axis has a plant of its own."""
+    known, gains, alone, gained = _gained(data, said)
+    own = np.asarray(log_softmax(alone + prior, axis=1))
+    ratios = log_sum_exp(gained + own[:, None], axis=2).sum(axis=0)
+    return _Hypothesis(ratios, np.exp(own), gains, known)
+
+
+def _gained(data: Statistics, said: _Said) -> tuple[Floats, Floats, Floats, Floats]:
+    """Precision and mean of the gains by what others have said, its evidence (axes, plants), and what each candidate
+    adds to that (axes, L, plants).
+    """
+    axes = data.information.shape[-1]
+    known = np.asarray(np.eye(axes) / GAIN_VARIANCE + said.precision)
+    information = np.asarray(said.information)
     alone = half_log_evidence(known, information)
     gains = np.linalg.solve(known, information[..., None])[..., 0]
     gained = half_log_evidence(known[:, None] + data.precision, information[:, None] + data.information)
-    gained -= alone[:, None]
-    shared = np.asarray(log_softmax(alone.sum(axis=0) + prior))
-    alike = log_sum_exp(gained.sum(axis=0) + shared, axis=1)
-    hypotheses = [_Hypothesis(alike, np.broadcast_to(np.exp(shared), alone.shape), gains, known)]
-    if len(alone) > 1:
-        own = np.asarray(log_softmax(alone + prior, axis=1))
-        apart = log_sum_exp(gained + own[:, None], axis=2).sum(axis=0)
-        hypotheses.append(_Hypothesis(apart, np.exp(own), gains, known))
-    return hypotheses
+    return known, gains, alone, gained - alone[:, None]
 
 
 def _doubt_outliers(
