@@ -84,6 +84,10 @@ JOBS: dict[str, Job] = {
         Job(name="64 bits in 16 s", framing=replace(_NUMBER, code="none"), windows=8, alphabet_size=_LARGE),
         Job(name="16 bytes of text in 36 s", framing=_TEXT, windows=18, alphabet_size=_LARGE),
         Job(
+            name="16 bytes of text in 30 s", framing=replace(_TEXT, code="none"), windows=14, alphabet_size=_LARGE,
+            ticks=107,
+        ),
+        Job(
             name="64 bits in 24 s, a fifth of the frames and one second hidden", framing=_NUMBER, windows=12,
             alphabet_size=_LARGE, hidden=_DROPS,
         ),

@@ -12,15 +12,21 @@ import numpy as np
 from mtm_audit.detectors.matched.candidates import Tones
 from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
 from mtm_audit.detectors.matched.correlate import Heard
-from mtm_audit.detectors.matched.hypotheses import log_rate_prior
+from mtm_audit.detectors.matched.evidence import log_sum_exp
+from mtm_audit.detectors.matched.hypotheses import log_clock_prior
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.model.timing import OnsetRange, Timing
 from mtm_audit.model.track import Floats
 
 _CHUNK = 256
-# Rates that move the recording's ends by half a cell against its middle, and starts in half cells.
+# Beside a few thousand starts one that stands out so far is the right one.
+_SURE_NATS = 10.0
+# Starts are weighed every half cell, since a message of many symbols is lost between whole ones: of its highest tone a
+# cell is a fifth of a period.
+_HALF_CELL = 0.5
+# Rates that move the recording's ends by half a cell against its middle, and starts in quarter cells.
 _RATE_STEPS = np.arange(-6, 7)
-_HALF_CELLS = np.arange(-2, 3) / 2.0
+_QUARTER_CELLS = np.arange(-2, 3) / 4.0
 
 
 @dataclass(frozen=True)
@@ -42,7 +48,7 @@ class Place:
 
 
 def starts_by_clock(
-    heard: Heard,
+    by_plant: Sequence[Heard],
     place: Place,
     tones: Sequence[Sequence[Tones]],
     bounds: OnsetRange,
@@ -50,31 +56,47 @@ def starts_by_clock(
 ) -> list[Found]:
     """For each codebook the best timing with the first window's start within bounds.
 
-    `heard` at the nominal rate; `tones` of the windows of each codebook, as many for all.
+    `by_plant` is what was heard at the nominal rate by each of some plants, the usual one first: where that leaves no
+    doubt, starts are not weighed by the others, which can only lower the evidence. `tones` of the windows of each
+    codebook, as many for all.
     """
     step_s = place.motion.step_s
-    # Whole cells, so that nothing that was heard needs to be turned.
     first = np.floor((bounds.low_s - place.motion.start_s) / step_s)
-    count = int(np.ceil((bounds.high_s - bounds.low_s) / step_s)) + 2
-    onsets_s = place.motion.start_s + (first + np.arange(count)) * step_s
-    evidences: list[list[Floats]] = [[] for _ in tones]
-    chunks = np.array_split(onsets_s, -(-count // _CHUNK))
-    for done, chunk in enumerate(chunks):
-        if progress is not None:
-            progress(done / len(chunks))
-        for collected, evidence in zip(evidences, _weigh(heard, place, tones, chunk, place.nominal_hz), strict=True):
-            collected.append(evidence)
-    starts_s = [float(onsets_s[np.argmax(np.concatenate(collected))]) for collected in evidences]
+    count = int(np.ceil((bounds.high_s - bounds.low_s) / step_s / _HALF_CELL)) + 3
+    onsets_s = place.motion.start_s + (first + np.arange(count) * _HALF_CELL) * step_s
+    evidences = _by_chunks(by_plant[0], place, tones, onsets_s, progress)
+    doubtful = [number for number, evidence in enumerate(evidences) if evidence.max() < _SURE_NATS]
+    for heard in by_plant[1:] if doubtful else ():
+        more = _by_chunks(heard, place, [tones[number] for number in doubtful], onsets_s)
+        for number, evidence in zip(doubtful, more, strict=True):
+            evidences[number] = np.logaddexp(evidences[number], evidence)
+    starts_s = [float(onsets_s[np.argmax(evidence)]) for evidence in evidences]
     found: dict[float, list[Found]] = {}
     for start_s in set(starts_s):
         # Alternatives are the same for all codebooks, and few share a best start: their answers are cheap.
         onsets, rates_hz = _around(place, start_s)
-        near = _weigh(
-            heard, place, [t for t, own in zip(tones, starts_s, strict=True) if own == start_s], onsets, rates_hz
-        )
-        prior = log_rate_prior(rates_hz, place.nominal_hz)
-        found[start_s] = [_best(evidence + prior, onsets, rates_hz) for evidence in near]
+        asked = [own for own, best_s in zip(tones, starts_s, strict=True) if best_s == start_s]
+        prior = log_clock_prior(rates_hz, place.nominal_hz) - np.log(len(by_plant))
+        near = zip(*(_weigh(heard, place, asked, onsets, rates_hz) for heard in by_plant), strict=True)
+        found[start_s] = [_best(log_sum_exp(np.stack(own), axis=0) + prior, onsets, rates_hz) for own in near]
     return [found[start_s].pop(0) for start_s in starts_s]
+
+
+def _by_chunks(
+    heard: Heard,
+    place: Place,
+    tones: Sequence[Sequence[Tones]],
+    onsets_s: Floats,
+    progress: Callable[[float], None] | None = None,
+) -> list[Floats]:
+    """Evidence (starts,) for each codebook at the nominal rate, not too many starts at once."""
+    chunks = np.array_split(onsets_s, -(-len(onsets_s) // _CHUNK))
+    weighed = []
+    for done, chunk in enumerate(chunks):
+        if progress is not None:
+            progress(done / len(chunks))
+        weighed.append(_weigh(heard, place, tones, chunk, place.nominal_hz))
+    return [np.concatenate(parts) for parts in zip(*weighed, strict=True)]
 
 
 def _weigh(
@@ -95,7 +117,7 @@ def _around(place: Place, start_s: float) -> tuple[Floats, Floats]:
     rates_hz = place.nominal_hz * (1.0 + _RATE_STEPS * motion.step_s / lasts_s)
     middle = np.rint((motion.start_s + lasts_s / 2.0 - start_s) / length_s)
     onsets_s = start_s + middle * (length_s - place.ticks / rates_hz)
-    return (onsets_s[:, None] + _HALF_CELLS * motion.step_s).ravel(), np.repeat(rates_hz, len(_HALF_CELLS))
+    return (onsets_s[:, None] + _QUARTER_CELLS * motion.step_s).ravel(), np.repeat(rates_hz, len(_QUARTER_CELLS))
 
 
 def _best(evidence: Floats, onsets_s: Floats, rates_hz: Floats) -> Found:

@@ -20,7 +20,9 @@ from mtm_onboard.protocol.scheme import Channel
 # Candidates times lags of one computation.
 _MOST_CORRELATED = 1 << 19
 
+# What robots are taken for, and one that follows half as fast. How late each is, starts take up.
 _TYPICAL = plant_family(np.array([0.07]), np.array([0.14]))
+_SLOWER = plant_family(np.array([0.07]), np.array([0.28]))
 
 
 @dataclass(frozen=True)
@@ -66,8 +68,13 @@ class Heard:
     cells: int
 
 
-def hear(prepared: Prepared, codebook: Codebook, channel: Channel, rate_hz: float, lead: int) -> Heard:
-    """Correlate at one candidate rate; of the codebook only its scheme matters."""
+def hear(
+    prepared: Prepared, codebook: Codebook, channel: Channel, rate_hz: float, lead: int, *, slower: bool = False
+) -> Heard:
+    """Correlate at one candidate rate, by the typical plant or a `slower` one.
+
+    Of the codebook only its scheme matters.
+    """
     motion, ticks = prepared.motion, codebook.scheme.window_ticks(channel)
     length_s = ticks / rate_hz
     tones_hz = codebook.bins(channel) * (rate_hz / ticks)
@@ -75,7 +82,7 @@ def hear(prepared: Prepared, codebook: Codebook, channel: Channel, rate_hz: floa
     count = len(motion.seen)
     lags = count + lead
     size = fft.next_fast_len(count + lead + cells)
-    kernel, settled = _kernel(tuple(tones_hz.tolist()), cells, motion.step_s, length_s, size)
+    kernel, settled = _kernel(tuple(tones_hz.tolist()), cells, motion.step_s, length_s, size, slower)
     shifted = np.zeros((len(prepared.filtered), size), dtype=np.float32)
     shifted[:, lead : lead + count] = prepared.filtered
     # Correlation: the sum over cells of shifted[lag + cell] times response[cell].
@@ -93,15 +100,16 @@ def hear(prepared: Prepared, codebook: Codebook, channel: Channel, rate_hz: floa
 
 @lru_cache(maxsize=160)
 def _kernel(
-    tones_hz: tuple[float, ...], cells: int, step_s: float, length_s: float, size: int
+    tones_hz: tuple[float, ...], cells: int, step_s: float, length_s: float, size: int, slower: bool
 ) -> tuple[NDArray[np.complex64], Floats]:
-    """Transform (K, size) of the typical plant's response to each tone, and its settled power (K,).
+    """Transform (K, size) of a plant's response to each tone, and its settled power (K,).
 
     Kept, since all bodies of a recording are searched at the same rates.
     """
     tones = np.array(tones_hz)
-    response = tone_responses(_TYPICAL, tones, (np.arange(cells) + 0.5) * step_s, length_s)[0]
-    settled = tone_responses(_TYPICAL, tones, np.array([MEMORY_S]), 2.0 * MEMORY_S)[0, :, 0]
+    plant = _SLOWER if slower else _TYPICAL
+    response = tone_responses(plant, tones, (np.arange(cells) + 0.5) * step_s, length_s)[0]
+    settled = tone_responses(plant, tones, np.array([MEMORY_S]), 2.0 * MEMORY_S)[0, :, 0]
     return fft.fft(response[:, ::-1].astype(np.complex64), size, axis=-1), np.abs(settled) ** 2
 
 

@@ -20,7 +20,7 @@ from mtm_audit.detectors.matched.refine import refined_timing
 from mtm_audit.detectors.matched.search import SEARCHED_RATES, search_timings
 from mtm_audit.detectors.matched.windows import LEAST_PART, Window, make_windows, shown_numbers
 from mtm_audit.model.glimpse import Glimpse
-from mtm_audit.model.timing import Onset, Timing
+from mtm_audit.model.timing import Onset, OnsetRange, Timing
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.errors import MtmError
@@ -130,7 +130,8 @@ class MatchedDetector:
         windows = _all_windows(codebook, own, moved, timings, shown)
         names = [channel.name for channel in own]
         found = estimate(windows, moved, noise, self._profile, elsewhere(windows, names, timings, others))
-        better = refined_timing(found, windows, moved, timings)
+        clock_hz = codebook.scheme.rate_hz if isinstance(onset, OnsetRange) else None
+        better = refined_timing(found, windows, moved, timings, clock_hz)
         if better != timings:
             del found
             timings = better

@@ -12,6 +12,8 @@ from mtm_audit.model.track import Bools, Floats
 _DRIFT_S = 0.02
 # Clocks that are off by more than this are possible but rare: the scale of a Cauchy prior over relative rates.
 _USUAL_RATE_ERROR = 0.003
+# Nearly all clocks that follow UTC keep its rate by a quartz: their part, and the scale of a Cauchy prior.
+_QUARTZ, _QUARTZ_RATE_ERROR = 0.9, 1e-4
 # Log prior, beside the nominal rate's, of rates within a thousandth: quartz is better than that.
 _USUAL_LOG_PRIOR = -0.1
 
@@ -80,6 +82,14 @@ def make_grid(
 def log_rate_prior(rates_hz: Floats, nominal_hz: float) -> Floats:
     """Log prior of clock rates, shape as the input."""
     return np.asarray(-np.log1p(((rates_hz / nominal_hz - 1.0) / _USUAL_RATE_ERROR) ** 2))
+
+
+def log_clock_prior(rates_hz: Floats, nominal_hz: float) -> Floats:
+    """As `log_rate_prior`, where clocks that follow UTC say the rate."""
+    error = rates_hz / nominal_hz - 1.0
+    quartz, other = _QUARTZ / _QUARTZ_RATE_ERROR, (1.0 - _QUARTZ) / _USUAL_RATE_ERROR
+    density = quartz / (1.0 + (error / _QUARTZ_RATE_ERROR) ** 2) + other / (1.0 + (error / _USUAL_RATE_ERROR) ** 2)
+    return np.asarray(np.log(density / (quartz + other)))
 
 
 def fold(evidence: Floats, grid: Grid, most: int, usual: int = 0) -> list[list[Hypothesis]]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from mtm_audit.detectors.matched.estimate import Estimate
+from mtm_audit.detectors.matched.hypotheses import log_clock_prior
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.detectors.matched.noise import whitened
 from mtm_audit.detectors.matched.windows import Window
@@ -16,25 +17,42 @@ _NEGLIGIBLE_S = 0.002
 _LARGEST_S = 0.04
 _PIECE_S = 2.0
 _FEWEST_PIECES = 4
+# Slopes that are weighed, in standard deviations from what was measured.
+_DEVIATIONS = np.linspace(-5.0, 5.0, 201)
 
 
 def refined_timing(
-    found: Estimate, windows: Sequence[Window], motions: Sequence[Motion], timings: Sequence[Timing]
+    found: Estimate,
+    windows: Sequence[Window],
+    motions: Sequence[Motion],
+    timings: Sequence[Timing],
+    clock_hz: float | None = None,
 ) -> list[Timing]:
     """Timings with rates corrected by the slope of the windows' delays; unchanged where the drift is negligible.
 
-    The delays are those of pieces of the windows against their expected signals, weighted by their information.
+    The delays are those of pieces of the windows against their expected signals, weighted by their information. Where
+    clocks that follow UTC say the rate it is `clock_hz`, which delays of a few windows do not disprove.
     """
     return [
         _refined(
-            found, [i for i, window in enumerate(windows) if window.observation == number], windows, motion, timing
+            found,
+            [i for i, window in enumerate(windows) if window.observation == number],
+            windows,
+            motion,
+            timing,
+            clock_hz,
         )
         for number, (motion, timing) in enumerate(zip(motions, timings, strict=True))
     ]
 
 
 def _refined(
-    found: Estimate, members: Sequence[int], windows: Sequence[Window], motion: Motion, timing: Timing
+    found: Estimate,
+    members: Sequence[int],
+    windows: Sequence[Window],
+    motion: Motion,
+    timing: Timing,
+    clock_hz: float | None,
 ) -> Timing:
     pieces = np.array([piece for index in members for piece in _delays(found, index, windows[index], motion)])
     if len(pieces) < _FEWEST_PIECES or pieces[:, 1].sum() <= 0.0:
@@ -45,12 +63,21 @@ def _refined(
     if spread <= 0.0:
         return timing
     slope = (information @ ((middles_s - centre_s) * delays_s)) / spread
+    if clock_hz is not None:
+        slope = _by_clock(slope, 1.0 / np.sqrt(spread), timing.rate_hz, clock_hz)
     if not _NEGLIGIBLE_S < abs(slope) * float(np.ptp(middles_s)) < 2.0 * _LARGEST_S:
         return timing
     # A signal that comes ever later was played by a slower clock.
     stretch = float(1.0 + slope)
     onset_s = float(centre_s + (timing.onset_s - centre_s) * stretch)
     return replace(timing, onset_s=onset_s, rate_hz=timing.rate_hz / stretch)
+
+
+def _by_clock(slope: float, deviation: float, rate_hz: float, clock_hz: float) -> float:
+    """The likeliest slope at `rate_hz` where it was measured with a standard deviation and a clock says the rate."""
+    slopes = np.append(slope + _DEVIATIONS * deviation, rate_hz / clock_hz - 1.0)
+    likely = -0.5 * ((slopes - slope) / deviation) ** 2 + log_clock_prior(rate_hz / (1.0 + slopes), clock_hz)
+    return float(slopes[np.argmax(likely)])
 
 
 def _delays(found: Estimate, index: int, window: Window, motion: Motion) -> list[tuple[float, float, float]]:

@@ -108,8 +108,8 @@ def search_timings(
     windows = waveform_sets(scheme, channel, motion, onset)
     tones = [LazyTones(book, one, windows) for book, one in played]
     if isinstance(onset, OnsetRange):
-        heard = hear(prepared, codebook, channel, scheme.rate_hz, lead)
-        return starts_by_clock(heard, Place(motion, lead, ticks, scheme.rate_hz), tones, onset, progress)
+        by_plant = [hear(prepared, codebook, channel, scheme.rate_hz, lead, slower=slower) for slower in (False, True)]
+        return starts_by_clock(by_plant, Place(motion, lead, ticks, scheme.rate_hz), tones, onset, progress)
     spacing = float(rates_hz[1] - rates_hz[0]) / scheme.rate_hz
     rates = _Rates(len(rates_hz), spacing, scheme.rate_hz)
 

@@ -27,7 +27,7 @@ def read(run):
 def test_symbols_are_read_under_the_refined_timing(run, monkeypatch):
     asked = []
 
-    def later(found, windows, motions, timings):
+    def later(found, windows, motions, timings, clock_hz):
         asked.append([len(found.signals), len(windows), len(motions)])
         return [replace(timing, onset_s=timing.onset_s + 0.5) for timing in timings]
 
@@ -46,7 +46,7 @@ def test_symbols_are_read_under_the_refined_timing(run, monkeypatch):
 def test_a_timing_that_needs_no_refining_is_read_once(run, monkeypatch):
     estimates = []
     plain = detector.estimate
-    monkeypatch.setattr(detector, "refined_timing", lambda found, windows, motions, timings: timings)
+    monkeypatch.setattr(detector, "refined_timing", lambda found, windows, motions, timings, clock_hz: timings)
     monkeypatch.setattr(detector, "estimate", lambda *asked: estimates.append(asked) or plain(*asked))
     readings = read(run)
     assert len(estimates) == 1

@@ -5,7 +5,7 @@ import pytest
 
 from mtm_audit.detectors.matched.byclock import Found
 from mtm_audit.detectors.matched.fleet import _fleet_timing, _Near, _settled
-from mtm_audit.detectors.matched.hypotheses import fold, log_rate_prior, make_grid
+from mtm_audit.detectors.matched.hypotheses import fold, log_clock_prior, log_rate_prior, make_grid
 from mtm_audit.detectors.matched.motion import Motion
 from mtm_audit.model.timing import Timing
 from tests.audit.moving_robot import key_of, scheme_of
@@ -19,6 +19,20 @@ OWN, FLEET = Timing(0.0, 50.0), Timing(1.0, 50.0)
 )
 def test_clocks_are_believed_to_be_near_their_rate(error, prior):
     assert np.exp(log_rate_prior(np.array([50.0 * (1.0 + error)]), 50.0)) == pytest.approx([prior])
+
+
+# Nine clocks of ten by a scale of a ten-thousandth, which makes them 270 times as dense at the nominal rate.
+@pytest.mark.parametrize(
+    ("error", "prior"),
+    [
+        (0.0, 1.0),
+        (1e-4, (270 / 2 + 1) / 271),
+        (0.003, (270 / 901 + 1 / 2) / 271),
+        (0.03, (270 / 90_001 + 1 / 101) / 271),
+    ],
+)
+def test_clocks_that_follow_utc_are_believed_to_be_quartz(error, prior):
+    assert np.exp(log_clock_prior(np.array([50.0 * (1.0 + error)]), 50.0)) == pytest.approx([prior], rel=0.01)
 
 
 def silent_motion(seconds=20.0, step_s=0.02):

@@ -12,7 +12,7 @@ TICK_S = 1.0 / RATE_HZ
 SECONDS = 24.0
 
 
-def refined(run, timing, count):
+def refined(run, timing, count, clock_hz=None):
     """The timings after as many refinements as it takes for nothing to change, three at the most."""
     motions = motions_of(run)
     noise = fit_recording_noise(motions, [motion.velocities for motion in motions])
@@ -25,7 +25,7 @@ def refined(run, timing, count):
             if window.observation == number
         ]
         found = estimate(windows, motions, noise)
-        better = refined_timing(found, windows, motions, timings)
+        better = refined_timing(found, windows, motions, timings, clock_hz)
         if better == timings:
             break
         timings = better
@@ -56,6 +56,21 @@ def test_a_clock_three_in_a_thousand_off_is_put_right(error):
 def test_a_clock_that_is_right_is_left_so():
     run = fleet_run(22, message_ticks=200, seconds=START_S + SECONDS)
     assert_drift_is_small(refined(run, Timing(START_S, RATE_HZ), count=6))
+
+
+@pytest.mark.parametrize("seed", [22, 24])
+def test_a_rate_that_a_clock_tells_is_not_moved_by_a_few_windows(seed):
+    run = fleet_run(seed, message_ticks=200, seconds=START_S + SECONDS)
+    for timing in refined(run, Timing(START_S, RATE_HZ), count=6, clock_hz=RATE_HZ):
+        assert timing.rate_hz == pytest.approx(RATE_HZ, rel=1e-4)
+
+
+def test_what_the_delays_disprove_a_clock_does_not_hold():
+    run = fleet_run(21, message_ticks=200, seconds=START_S + SECONDS)
+    rate_hz = RATE_HZ * 1.003
+    middle_s = START_S + SECONDS / 2
+    wrong = Timing(middle_s - SECONDS / 2 * RATE_HZ / rate_hz, rate_hz)
+    assert_drift_is_small(refined(run, wrong, count=6, clock_hz=rate_hz))
 
 
 def test_a_moment_of_a_message_says_nothing_about_the_clock():
