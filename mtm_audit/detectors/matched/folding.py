@@ -7,13 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mtm_audit.detectors.matched.candidates import Tones
-from mtm_audit.detectors.matched.correlate import evidence_by_lag, skimmed_by_lag
+from mtm_audit.detectors.matched.correlate import Heard, evidence_by_lag, skimmed_by_lag
 from mtm_audit.detectors.matched.hypotheses import Grid, Hypothesis, fold
 from mtm_audit.detectors.matched.places import Places
 
 _PEAKS_PER_RATE = 8
 # Starts beside a peak of cells that were skimmed.
 _BESIDE = (-1, 0, 1)
+# What was heard at all rates may take so much while they are compared.
+_KEPT_BYTES = 40_000_000
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Folding:
         self.places, self.tones = places, tones
         # The nominal rate is asked for twice.
         self._middle: NDArray[np.float32] | None = None
+        self._heard: dict[int, Heard] = {}
 
     def best(self, coarse: int, starts: int, every: int = 1) -> list[list[Candidate]]:
         """Each codebook's best hypotheses near one coarse rate, and the best `starts` at rates of usual clocks.
@@ -50,13 +53,22 @@ class Folding:
             for peaks in folded
         ]
 
+    def heard(self, coarse: int) -> Heard:
+        """The motion correlated at a coarse rate, kept where that is cheap: most are asked for twice."""
+        if coarse in self._heard:
+            return self._heard[coarse]
+        heard = self.places.heard(coarse)
+        if heard.projections.nbytes * self.places.rates.count <= _KEPT_BYTES:
+            self._heard[coarse] = heard
+        return heard
+
     def _evidence(self, coarse: int, every: int) -> NDArray[np.float32]:
         middle = coarse == self.places.rates.middle
         if every > 1:
-            return skimmed_by_lag(self.tones, self.places.heard(coarse), every)
+            return skimmed_by_lag(self.tones, self.heard(coarse), every)
         if middle and self._middle is not None:
             return self._middle
-        found = evidence_by_lag(self.tones, self.places.heard(coarse))
+        found = evidence_by_lag(self.tones, self.heard(coarse))
         if middle:
             self._middle = found
         return found

@@ -214,7 +214,7 @@ def _best_of_rates(folding: Folding, sweep: Sweep, report: _Report) -> list[tupl
     for coarse in sorted({item.coarse for found in chosen for item in found}):
         here = [[item for item in found if item.coarse == coarse] for found in chosen]
         numbers = [number for number, items in enumerate(here) if items]
-        weighed = _weigh(folding.places, coarse, [folding.tones[n] for n in numbers], [here[n] for n in numbers])
+        weighed = _weigh(folding, coarse, [folding.tones[n] for n in numbers], [here[n] for n in numbers])
         for number, winner in zip(numbers, weighed, strict=True):
             best[number] = max(best[number], winner, key=_evidence)
     return best
@@ -225,10 +225,10 @@ def _evidence(weighed: tuple[float, Candidate]) -> float:
 
 
 def _weigh(
-    places: Places, coarse: int, tones: Sequence[Sequence[Tones]], candidates: Sequence[Sequence[Candidate]]
+    folding: Folding, coarse: int, tones: Sequence[Sequence[Tones]], candidates: Sequence[Sequence[Candidate]]
 ) -> list[tuple[float, Candidate]]:
     """For each codebook the best of its hypotheses of one grid, with its coherent evidence."""
-    heard, grid = places.heard(coarse), places.grid(coarse)
+    heard, grid = folding.heard(coarse), folding.places.grid(coarse)
     rates = [np.array([item.hypothesis.rate for item in items]) for items in candidates]
     starts = [np.array([item.hypothesis.start for item in items]) for items in candidates]
     questions = [
@@ -236,7 +236,7 @@ def _weigh(
         for numbered, rate, start in zip(tones, rates, starts, strict=True)
     ]
     result = []
-    answers = coherent_evidence(heard, questions, places.motion.step_s)
+    answers = coherent_evidence(heard, questions, folding.places.motion.step_s)
     for evidence, rate, items in zip(answers, rates, candidates, strict=True):
         weighed = evidence + grid.prior[rate]
         winner = int(np.argmax(weighed))
