@@ -49,6 +49,12 @@ def stacked_tones(codebook: Codebook, channel: Channel, number: int, symbols: Se
     return derived
 
 
+def _kept_tones(codebook: Codebook, channel: Channel, number: int) -> Tones | None:
+    """`stacked_tones` of a whole large alphabet where they are at hand."""
+    place = (channel, 0 if codebook.scheme.schedule == "fixed" else number)
+    return _kept.get(codebook, OrderedDict()).get(place)
+
+
 def forget(codebook: Codebook) -> None:
     """Keep no more of a codebook's tones: they are derived again when they are asked for."""
     _kept.pop(codebook, None)
@@ -75,7 +81,7 @@ def _make_room(size: int) -> None:
 
 
 class WindowTones:
-    """The candidates of one window: `whole` in single precision, chosen ones in full."""
+    """The candidates of one window; of a large alphabet they are known in single precision."""
 
     def __init__(self, codebook: Codebook, channel: Channel, number: int) -> None:
         self._codebook, self._channel, self._number = codebook, channel, number
@@ -108,7 +114,13 @@ class WindowTones:
 
     def of(self, symbols: Integers) -> Floats:
         """Real and imaginary parts of the symbols' tones, side by side: (symbols, axes, 2 K)."""
-        return self._held[symbols] if len(self) <= WHOLE else self._derived(symbols.tolist())
+        if len(self) <= WHOLE:
+            return self._held[symbols]
+        kept = _kept_tones(self._codebook, self._channel, self._number)
+        if kept is None:
+            return self._derived(symbols.tolist())
+        # Imaginary parts have the other sign in what is kept.
+        return np.asarray(kept[symbols] * np.repeat([1.0, -1.0], self.shape[2] // 2))
 
     @cached_property
     def _held(self) -> Floats:

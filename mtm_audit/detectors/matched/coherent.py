@@ -24,6 +24,8 @@ _KEPT = 32
 _MOST_TOGETHER = 32_768
 # Windows times candidates of one product of matrices.
 _MOST_CORRELATED = 1 << 18
+# Whole cells at which all candidates are weighed at once.
+_CELLS = 64
 # Windows times such candidates of one computation.
 _MOST_FEW = 1 << 15
 # Of a large alphabet so many candidates are looked at around each whole cell.
@@ -208,16 +210,19 @@ def _strongest_by_cell(heard: Heard, cells: NDArray[np.int64], tones: Tones) -> 
     """The candidates that correlate most with what was heard at whole lags, (cells, `_NEAR_A_CELL`)."""
     count, axes, _ = tones.shape
     columns = heard.projections[:, :, np.clip(cells, 0, heard.seen.shape[1] - 1)].transpose(0, 2, 1)
-    flat = [np.ascontiguousarray(tones[:, axis].T) for axis in range(axes)]
     result = np.empty((len(cells), _NEAR_A_CELL), dtype=np.int64)
-    for chunk in np.array_split(np.arange(len(cells)), -(-len(cells) * count // _MOST_CORRELATED)):
-        strength = np.zeros((len(chunk), count), dtype=np.float32)
-        for row in columns[:, chunk]:
-            for own in flat:
-                correlated = row @ own
-                correlated *= correlated
-                strength += correlated
-        result[chunk] = np.argpartition(strength, count - _NEAR_A_CELL, axis=1)[:, -_NEAR_A_CELL:]
+    for first in range(0, len(cells), _CELLS):
+        rows = np.ascontiguousarray(columns[:, first : first + _CELLS])
+        strength = np.zeros((rows.shape[1], count), dtype=np.float32)
+        for begin in range(0, count, _MOST_CORRELATED // _CELLS):
+            own = tones[begin : begin + _MOST_CORRELATED // _CELLS]
+            part = strength[:, begin : begin + len(own)]
+            for axis in range(axes):
+                for row in rows:
+                    correlated = row @ own[:, axis].T
+                    correlated *= correlated
+                    part += correlated
+        result[first : first + _CELLS] = np.argpartition(strength, count - _NEAR_A_CELL, axis=1)[:, -_NEAR_A_CELL:]
     return result
 
 

@@ -1,7 +1,7 @@
 """The whitened motion correlated with every tone at every instant: what all candidates of all codebooks share."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -18,7 +18,7 @@ from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel
 
 # Candidates times lags of one computation.
-_MOST_CORRELATED = 1 << 19
+_MOST_CORRELATED = 1 << 18
 
 # What robots are taken for, and one that follows half as fast. How late each is, starts take up.
 _TYPICAL = plant_family(np.array([0.07]), np.array([0.14]))
@@ -126,7 +126,9 @@ def template_power(tones: Tones, heard: Heard) -> Floats:
     """Mean power of a candidate's whitened template in a fully seen cell, (observed axes, axes); candidates differ
     little.
     """
-    power: Floats = heard.steady @ (tones**2).mean(axis=0).T / 2.0
+    blocks = np.array_split(tones, -(-tones.size // _MOST_CORRELATED))
+    squares = np.sum([np.sum(block * block, axis=0) for block in blocks], axis=0, dtype=np.float64)
+    power: Floats = heard.steady @ (squares / len(tones)).T / 2.0
     return power
 
 
@@ -145,6 +147,18 @@ def evidence_by_lag(tones: Sequence[Sequence[Tones]], heard: Heard) -> NDArray[n
     return result.reshape(sets, windows, lags)
 
 
+def skimmed_by_lag(tones: Sequence[Sequence[Tones]], heard: Heard, every: int) -> NDArray[np.float32]:
+    """About `evidence_by_lag`, computed at one in `every` lags: what lies between two of them has the larger's."""
+    lags = np.arange(heard.projections.shape[-1])
+    some = replace(
+        heard, projections=np.ascontiguousarray(heard.projections[..., ::every]), seen=heard.seen[:, ::every]
+    )
+    found = evidence_by_lag(tones, some)
+    below = lags // every
+    above = np.minimum(-(-lags // every), found.shape[-1] - 1)
+    return np.maximum(found[..., below], found[..., above])
+
+
 def _evidence_of(sets: Sequence[Tones], heard: Heard) -> NDArray[np.float32]:
     """The same for sets of waveforms (M, axes, 2 K) each to (sets, lags)."""
     # Waveforms differ little in power, so that one scale serves all candidates of a set.
@@ -156,11 +170,7 @@ def _evidence_of(sets: Sequence[Tones], heard: Heard) -> NDArray[np.float32]:
     if len(sets) > 1 or count * lags <= _MOST_CORRELATED:
         found = log_sum_exp(_explained(np.stack(sets), heard, scales), axis=1)
     else:
-        # A large alphabet a block after the other, none of which leaves the processor's cache.
-        blocks = np.array_split(sets[0], -(-count * lags // _MOST_CORRELATED))
-        found = log_sum_exp(
-            np.stack([log_sum_exp(_explained(block[None], heard, scales), axis=1) for block in blocks]), axis=0
-        )
+        found = _log_total(sets[0], heard, scales[0])[None]
     return np.asarray(found - np.float32(np.log(count)) - penalty)
 
 
@@ -178,3 +188,31 @@ def _explained(tones: Tones, heard: Heard, scales: NDArray[np.float32]) -> NDArr
             correlation *= scales[:, row, axis, None]
             total += correlation
     return total
+
+
+def _log_total(tones: Tones, heard: Heard, scales: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Log of the sum over candidates (M, axes, 2 K) of the exponential of what each explains, (lags,) nats; `scales`
+    (observed axes, axes, lags).
+
+    A large alphabet goes a block after the other, none of which leaves the processor's cache.
+    """
+    count, lags = len(tones), scales.shape[-1]
+    # Scaling what was heard takes less than scaling what every candidate makes of it.
+    scaled = [(axis, projection * np.sqrt(scales[row, axis]))
+              for axis in range(tones.shape[1]) for row, projection in enumerate(heard.projections)]  # fmt: skip
+    sums = []
+    together = max(1, _MOST_CORRELATED // lags)
+    totals, correlations = np.empty((2, together, lags), dtype=np.float32)
+    for first in range(0, count, together):
+        block = tones[first : first + together]
+        total, correlation = totals[: len(block)], correlations[: len(block)]
+        total[:] = 0.0
+        for axis, projection in scaled:
+            np.matmul(block[:, axis], projection, out=correlation)
+            np.multiply(correlation, correlation, out=correlation)
+            np.add(total, correlation, out=total)
+        top = total.max(axis=0)
+        np.subtract(total, top, out=total)
+        np.exp(total, out=total)
+        sums.append(top + np.log(total.sum(axis=0)))
+    return log_sum_exp(np.stack(sums), axis=0)

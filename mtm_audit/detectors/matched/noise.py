@@ -75,7 +75,7 @@ def whitened_from_silence(signals: Floats, history: int, whitening_filter: Float
         heard = np.arange(max(0, first - order), cells[-1] + 1)
         delays = cells - heard[:, None]
         taps = np.where((delays >= 0) & (delays <= order), whitening_filter[np.clip(delays, 0, order)], 0.0)
-        result[:, cells[0] : cells[-1] + 1] = flat[:, heard[0] : heard[-1] + 1] @ taps
+        result[:, cells[0] : cells[-1] + 1] = flat[:, heard[0] : heard[-1] + 1] @ taps.astype(flat.dtype)
     return result.reshape(signals.shape)[..., order - history :]
 
 

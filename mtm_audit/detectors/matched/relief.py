@@ -17,6 +17,8 @@ from mtm_audit.model.track import Floats
 # How much of the power that gains explain is taken off the interference, and the largest part they may explain.
 _RELIEF = 0.8
 _LARGEST_SHARE = 0.95
+# Numbers in one array of a computation.
+_MOST_AT_ONCE = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -45,18 +47,36 @@ class Relief:
         `columns` (hypotheses, windows, observed axes, 2 K) is what was heard and `weights` (hypotheses, windows,
         observed axes) of how many cells; `gains` (hypotheses, starts, pairs).
         """
-        return np.stack([self._log_mean(columns, weights, gains[:, start]) for start in range(gains.shape[1])], axis=-1)
+        weighed = weights.astype(np.float32)[..., None] * self.steady.astype(np.float32)
+        numbers = columns.size // columns.shape[2] * self.power.shape[1]
+        groups = np.array_split(gains, -(-gains.shape[1] // max(1, _MOST_AT_ONCE // max(1, numbers))), axis=1)
+        return np.concatenate([self._log_mean(columns, weighed, some) for some in groups], axis=-1)
 
-    def _log_mean(self, columns: Floats, weights: Floats, gains: Floats) -> Floats:
-        """For gains (hypotheses, pairs): tones of weights u, q and variance v add u^2 v / (1 + q v) - log(1 + q v),
-        halved.
+    def _log_mean(self, columns: Floats, weighed: Floats, gains: Floats) -> Floats:
+        """Tones of weights u, q and variance v add u^2 v / (1 + q v) - log(1 + q v), halved; `weighed` (hypotheses,
+        windows, observed axes, 2 K) what q follows from.
         """
-        turned = gains.reshape(-1, *self.power.shape)
-        factors = self.factors(gains).reshape(turned.shape).astype(np.float32)
-        linear = np.einsum("hoa,hwok->hwak", turned * factors, columns, optimize=True)
-        quadratic = np.einsum("hoa,hwo,ok->hwak", 0.5 * turned**2 * factors, weights, self.steady, optimize=True)
-        grown = 1.0 + quadratic * self.spread
-        return np.asarray(0.5 * np.sum(linear**2 * self.spread / grown - np.log(grown), axis=(2, 3)))
+        hypotheses, starts, _ = gains.shape
+        observed, axes = self.power.shape
+        factors = self.factors(gains).astype(np.float32)
+        # (hypotheses, starts and axes, observed axes), which every window of a hypothesis has in common.
+        pulled, bent = (
+            own.reshape(hypotheses, starts, observed, axes)
+            .transpose(0, 1, 3, 2)
+            .reshape(hypotheses, 1, starts * axes, observed)
+            for own in (gains * factors, np.float32(0.5) * gains**2 * factors)
+        )
+        spread = self.spread.astype(np.float32)
+        linear = pulled @ columns
+        grown = bent @ weighed
+        grown *= spread
+        grown += np.float32(1.0)
+        linear *= linear
+        linear *= spread
+        linear /= grown
+        linear -= np.log(grown, out=grown)
+        found = linear.reshape(hypotheses, -1, starts, axes * linear.shape[-1]).sum(axis=-1)
+        return np.asarray(0.5 * found.astype(np.float64))
 
 
 def relief_of(heard: Heard, tones: Tones) -> Relief:

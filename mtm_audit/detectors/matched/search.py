@@ -7,17 +7,17 @@ Signs, rotations and mirrors of the camera do not matter. All of it is done for 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
 from mtm_audit.detectors.matched.byclock import Found, Place, starts_by_clock
 from mtm_audit.detectors.matched.candidates import WHOLE, LazyTones, Tones
 from mtm_audit.detectors.matched.coherent import Question, coherent_evidence
-from mtm_audit.detectors.matched.correlate import Heard, Prepared, evidence_by_lag, hear
-from mtm_audit.detectors.matched.hypotheses import Grid, Hypothesis, fold, make_grid
+from mtm_audit.detectors.matched.correlate import Prepared, hear
+from mtm_audit.detectors.matched.folding import Candidate, Folding
 from mtm_audit.detectors.matched.motion import Motion
+from mtm_audit.detectors.matched.places import Places
+from mtm_audit.detectors.matched.rates import USUAL_RATES, Sweep, Told, usual_first
 from mtm_audit.model.timing import Onset, OnsetRange, Timing
 from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
@@ -25,32 +25,16 @@ from mtm_onboard.protocol.scheme import Channel, Scheme
 
 SEARCHED_RATES = 0.2
 _PHASE_ERROR_RAD = 0.6
-_PEAKS_PER_RATE = 8
 _WEIGHED = 64
-# Window by window a weak message is lost among starts; at usual rates so many are weighed whatever they look like.
-_USUAL_STARTS = 128
-_USUAL_RATES = 0.03
-_PLAIN_NATS = 20.0
-# Of the distance between coarse rates; half of it is where the next one's begin.
-_NEAR_NOMINAL = 0.25
 _HALF_CELLS = np.arange(-3, 4) / 2.0
 # How much later than the typical plant a robot may follow, where its onset is known.
 _LATER_S = np.array([0.0, 0.1, 0.2])
+# Of alphabets above this, which cost most to look for, one in so many unusual rates and cells is looked at first.
+_SKIM_ABOVE = 16_384
+_SKIMMED = 2
 
 
-@dataclass(frozen=True)
-class _Candidate:
-    """A hypothesis and the coarse rate in whose grid it stands."""
-
-    coarse: int
-    hypothesis: Hypothesis
-    rate_hz: float
-
-
-# What all codebooks share at one coarse rate, by its number.
-_Place = Callable[[int], tuple[Heard, Grid]]
 _Report = Callable[[float], None]
-_Best = TypeVar("_Best")
 
 
 def candidate_rates(scheme: Scheme, channel: Channel, onset: Onset) -> Floats:
@@ -101,7 +85,7 @@ def search_timings(
     ticks = scheme.window_ticks(channel)
     rates_hz = candidate_rates(scheme, channel, onset)
     if usual_rates and len(rates_hz) > 1:
-        near = np.abs(rates_hz / scheme.rate_hz - 1.0) <= _USUAL_RATES
+        near = np.abs(rates_hz / scheme.rate_hz - 1.0) <= USUAL_RATES
         # A spacing is needed however far apart the rates are.
         rates_hz = rates_hz[near] if near.sum() > 1 else rates_hz[len(rates_hz) // 2 - 1 : len(rates_hz) // 2 + 2]
     lead = lead_cells(scheme, channel, motion, onset)
@@ -110,207 +94,141 @@ def search_timings(
     if isinstance(onset, OnsetRange):
         by_plant = [hear(prepared, codebook, channel, scheme.rate_hz, lead, slower=slower) for slower in (False, True)]
         return starts_by_clock(by_plant, Place(motion, lead, ticks, scheme.rate_hz), tones, onset, progress)
-    spacing = float(rates_hz[1] - rates_hz[0]) / scheme.rate_hz
-    rates = _Rates(len(rates_hz), spacing, scheme.rate_hz)
-
-    def place(coarse: int) -> tuple[Heard, Grid]:
-        rate_hz = float(rates_hz[coarse])
-        grid = make_grid(motion, scheme.rate_hz, rate_hz, spacing, ticks, lead, windows, onset)
-        return hear(prepared, codebook, channel, rate_hz, lead), grid
+    places = Places(
+        prepared=prepared,
+        codebook=codebook,
+        channel=channel,
+        rates_hz=rates_hz,
+        lead=lead,
+        windows=windows,
+        onset=onset,
+    )
 
     def report(fraction: float) -> None:
         if progress is not None:
             progress(fraction)
 
     if isinstance(onset, int | float):
-        return _delays_and_rates(place, rates, tones, motion, lead, report)
-    return _onsets_and_rates(place, rates, tones, motion, lead, report)
+        return _delays_and_rates(places, tones, report)
+    return _onsets_and_rates(places, tones, report)
 
 
-def _delays_and_rates(
-    place: _Place,
-    rates: "_Rates",
-    tones: Sequence[Sequence[Tones]],
-    motion: Motion,
-    lead: int,
-    report: _Report,
-) -> list[Found]:
+def _delays_and_rates(places: Places, tones: Sequence[Sequence[Tones]], report: _Report) -> list[Found]:
     """Only the rate is open, and how late the robot follows: all can be weighed with one set of gains."""
-    best = _usual_first(
-        rates,
-        lambda some, _: _best_delays(place, some, tones, motion, lead, report),
-        lambda each: _Told(each[0].evidence, each[1], each[0].timing.rate_hz),
-        _is_large(tones),
+    best = usual_first(
+        places.rates,
+        lambda sweep: _best_delays(places, sweep, tones, report),
+        lambda each: Told(each[0].evidence, each[1], each[0].timing.rate_hz),
+        nominal_first=_is_large(tones),
     )
-    return [_closer(place, coarse, each, tones[number], motion, lead) for number, (each, coarse) in enumerate(best)]
+    return [_closer(places, coarse, each, tones[number]) for number, (each, coarse) in enumerate(best)]
 
 
 def _best_delays(
-    place: _Place,
-    rates: Sequence[int],
-    tones: Sequence[Sequence[Tones]],
-    motion: Motion,
-    lead: int,
-    report: _Report,
+    places: Places, sweep: Sweep, tones: Sequence[Sequence[Tones]], report: _Report
 ) -> list[tuple[Found, int]]:
     """The best timing of each channel at some coarse rates, and at which of them."""
     best: list[tuple[Found, int]] = []
-    for done, coarse in enumerate(rates):
-        report(done / len(rates))
-        heard, grid = place(coarse)
-        found = _surroundings(heard, grid, tones, [0] * len(tones), motion, lead, _LATER_S / motion.step_s)
+    for done, coarse in enumerate(sweep.numbers):
+        report(done / len(sweep.numbers))
+        found = _surroundings(places, coarse, tones, [0] * len(tones), _LATER_S / places.motion.step_s)
         here = [(each, coarse) for each in found]
         best = here if not best else [max(pair, key=_found_evidence) for pair in zip(best, here, strict=True)]
     return best
-
-
-@dataclass(frozen=True)
-class _Rates:
-    """The coarse rates: `count` of them, the nominal one in the middle, relative `spacing` apart."""
-
-    count: int
-    spacing: float
-    nominal_hz: float
-
-    @property
-    def middle(self) -> int:
-        """The number of the nominal rate."""
-        return self.count // 2
-
-    def by_use(self) -> tuple[list[int], list[int]]:
-        """The numbers of the rates that usual clocks have, and of the others."""
-        usual = [at for at in range(self.count) if abs(at - self.middle) * self.spacing <= _USUAL_RATES]
-        return usual, [at for at in range(self.count) if at not in usual]
-
-
-@dataclass(frozen=True)
-class _Told:
-    """A result's evidence, its coarse rate's number and its rate."""
-
-    evidence: float
-    coarse: int
-    rate_hz: float
 
 
 def _is_large(tones: Sequence[Sequence[Tones]]) -> bool:
     return len(tones[0][0]) > WHOLE
 
 
-def _usual_first(
-    rates: _Rates,
-    best_at: Callable[[Sequence[int], int], list[_Best]],
-    told: Callable[[_Best], _Told],
-    large: bool,
-) -> list[_Best]:
-    """The best of each channel at the coarse rates of usual clocks, and where one does not stand out there, at all.
-
-    A `large` alphabet, which costs most to look for, is looked for at the nominal rate before that, where it peaks.
-    """
-    if large:
-        best = best_at([rates.middle], 0)
-        if _plain_at_nominal([told(each) for each in best], rates):
-            return best
-    usual, others = rates.by_use()
-    best = best_at(usual, _USUAL_STARTS)
-    if others and not _plain([told(each) for each in best], rates):
-        best = [
-            max(pair, key=lambda each: told(each).evidence)
-            for pair in zip(best, best_at(others, _USUAL_STARTS), strict=True)
-        ]
-    return best
-
-
-def _plain_at_nominal(best: Sequence[_Told], rates: _Rates) -> bool:
-    """Whether every message stands out near the nominal rate, clear of what the next coarse rate would show better."""
-    far = _NEAR_NOMINAL * rates.spacing
-    return all(one.evidence > _PLAIN_NATS and abs(one.rate_hz / rates.nominal_hz - 1.0) <= far for one in best)
-
-
-def _plain(best: Sequence[_Told], rates: _Rates) -> bool:
-    """Whether every message stands out well inside the usual rates: clocks are seldom far off, and then others cannot
-    do better.
-    """
-    return all(
-        one.evidence > _PLAIN_NATS and abs(one.coarse - rates.middle) * rates.spacing <= 0.5 * _USUAL_RATES
-        for one in best
-    )
-
-
 def _found_evidence(found: tuple[Found, int]) -> float:
     return found[0].evidence
 
 
-def _closer(place: _Place, coarse: int, found: Found, tones: Sequence[Tones], motion: Motion, lead: int) -> Found:
+def _closer(places: Places, coarse: int, found: Found, tones: Sequence[Tones]) -> Found:
     """The best timing in half cells around one that was found with a known onset."""
-    heard, grid = place(coarse)
-    later = (found.timing.onset_s - motion.start_s) / motion.step_s + lead - grid.starts[0]
-    return _surroundings(heard, grid, [tones], [0], motion, lead, later + _HALF_CELLS)[0]
+    motion = places.motion
+    later = (found.timing.onset_s - motion.start_s) / motion.step_s + places.lead - places.grid(coarse).starts[0]
+    return _surroundings(places, coarse, [tones], [0], later + _HALF_CELLS)[0]
 
 
-def _onsets_and_rates(
-    place: _Place,
-    rates: "_Rates",
-    tones: Sequence[Sequence[Tones]],
-    motion: Motion,
-    lead: int,
-    report: _Report,
-) -> list[Found]:
-    best = _usual_first(
-        rates,
-        lambda some, usual: _best_of_rates(place, some, usual, tones, motion, report),
-        lambda each: _Told(each[0], each[1].coarse, each[1].rate_hz),
-        _is_large(tones),
+def _onsets_and_rates(places: Places, tones: Sequence[Sequence[Tones]], report: _Report) -> list[Found]:
+    folding = Folding(places, tones)
+    best = usual_first(
+        places.rates,
+        lambda sweep: _best_of_rates(folding, sweep, report),
+        lambda each: Told(each[0], each[1].coarse, each[1].rate_hz),
+        nominal_first=_is_large(tones),
+        every=_SKIMMED if len(tones[0][0]) > _SKIM_ABOVE else 1,
     )
     found_at: dict[int, Found] = {}
-    winning = sorted({winner.coarse for _, winner in best})
-    for done, coarse in enumerate(winning):
+    winning = sorted({(winner.coarse, winner.skimmed) for _, winner in best})
+    for done, (coarse, skimmed) in enumerate(winning):
         report(0.5 + 0.5 * done / len(winning))
-        heard, grid = place(coarse)
-        numbers = [number for number, (_, winner) in enumerate(best) if winner.coarse == coarse]
+        numbers = [n for n, (_, winner) in enumerate(best) if (winner.coarse, winner.skimmed) == (coarse, skimmed)]
+        if skimmed:
+            found_at.update({number: _turned(places, best[number][1], tones[number]) for number in numbers})
+            continue
         starts = [best[number][1].hypothesis.start for number in numbers]
-        near = _surroundings(heard, grid, [tones[n] for n in numbers], starts, motion, lead, _HALF_CELLS)
+        near = _surroundings(places, coarse, [tones[number] for number in numbers], starts, _HALF_CELLS)
         found_at.update(zip(numbers, near, strict=True))
     return [found_at[number] for number in range(len(best))]
 
 
-def _best_of_rates(
-    place: _Place, rates: Sequence[int], usual: int, tones: Sequence[Sequence[Tones]], motion: Motion, report: _Report
-) -> list[tuple[float, _Candidate]]:
-    """The best hypothesis of each channel at some coarse rates, with its coherent evidence.
-
-    `usual` starts are weighed whatever they look like.
+def _turned(places: Places, near: Candidate, tones: Sequence[Tones]) -> Found:
+    """The best timing around one whose rate was skimmed: rates of the coarse ones next to it as well, turned about the
+    window in the recording's middle, and onsets in half cells.
     """
-    candidates: list[list[_Candidate]] = [[] for _ in tones]
-    for done, coarse in enumerate(rates):
-        report(0.5 * done / len(rates))
-        heard, grid = place(coarse)
-        for number, peaks in enumerate(fold(evidence_by_lag(tones, heard), grid, _PEAKS_PER_RATE, usual)):
-            candidates[number] += [_Candidate(coarse, peak, float(grid.rates_hz[peak.rate])) for peak in peaks]
-    chosen = [sorted(found, key=lambda item: -item.hypothesis.evidence)[: _WEIGHED + usual]
+    motion, ticks = places.motion, places.codebook.scheme.window_ticks(places.channel)
+    cells = len(motion.seen)
+    best: list[Found] = []
+    for coarse in range(max(near.coarse - 1, 0), min(near.coarse + 2, places.rates.count)):
+        grid = places.grid(coarse)
+        lengths = ticks / grid.rates_hz / motion.step_s
+        length = ticks / near.rate_hz / motion.step_s
+        start = float(near.hypothesis.start)
+        middle = np.rint((places.lead + cells / 2.0 - start) / length)
+        starts = ((start + middle * (length - lengths))[:, None] + _HALF_CELLS).ravel()
+        numbers = np.arange(grid.lags.shape[2])
+        lags = starts[:, None] + numbers * np.repeat(lengths, len(_HALF_CELLS))[:, None]
+        inside = (lags >= 0) & (lags <= cells + places.lead - 1)
+        (answer,) = coherent_evidence(places.heard(coarse), [Question(tones, lags, inside)], motion.step_s)
+        evidence = answer + np.repeat(grid.prior, len(_HALF_CELLS))
+        top = int(np.argmax(evidence))
+        onset_s = motion.start_s + (float(starts[top]) - places.lead) * motion.step_s
+        rate_hz = float(grid.rates_hz[top // len(_HALF_CELLS)])
+        best.append(Found(Timing(onset_s, rate_hz), float(evidence[top])))
+    return max(best, key=lambda found: found.evidence)
+
+
+def _best_of_rates(folding: Folding, sweep: Sweep, report: _Report) -> list[tuple[float, Candidate]]:
+    """The best hypothesis of each channel in one round of the search, with its coherent evidence."""
+    candidates: list[list[Candidate]] = [[] for _ in folding.tones]
+    for done, coarse in enumerate(sweep.numbers):
+        report(0.5 * done / len(sweep.numbers))
+        for own, more in zip(candidates, folding.best(coarse, sweep.starts, sweep.every), strict=True):
+            own += more
+    chosen = [sorted(found, key=lambda item: -item.hypothesis.evidence)[: _WEIGHED + sweep.starts]
               for found in candidates]  # fmt: skip
     best = [(-np.inf, found[0]) for found in chosen]
     for coarse in sorted({item.coarse for found in chosen for item in found}):
-        heard, grid = place(coarse)
         here = [[item for item in found if item.coarse == coarse] for found in chosen]
         numbers = [number for number, items in enumerate(here) if items]
-        weighed = _weigh(heard, grid, [tones[number] for number in numbers], [here[n] for n in numbers], motion.step_s)
+        weighed = _weigh(folding, coarse, [folding.tones[n] for n in numbers], [here[n] for n in numbers])
         for number, winner in zip(numbers, weighed, strict=True):
             best[number] = max(best[number], winner, key=_evidence)
     return best
 
 
-def _evidence(weighed: tuple[float, _Candidate]) -> float:
+def _evidence(weighed: tuple[float, Candidate]) -> float:
     return weighed[0]
 
 
 def _weigh(
-    heard: Heard,
-    grid: Grid,
-    tones: Sequence[Sequence[Tones]],
-    candidates: Sequence[Sequence[_Candidate]],
-    step_s: float,
-) -> list[tuple[float, _Candidate]]:
+    folding: Folding, coarse: int, tones: Sequence[Sequence[Tones]], candidates: Sequence[Sequence[Candidate]]
+) -> list[tuple[float, Candidate]]:
     """For each codebook the best of its hypotheses of one grid, with its coherent evidence."""
+    heard, grid = folding.heard(coarse), folding.places.grid(coarse)
     rates = [np.array([item.hypothesis.rate for item in items]) for items in candidates]
     starts = [np.array([item.hypothesis.start for item in items]) for items in candidates]
     questions = [
@@ -318,7 +236,8 @@ def _weigh(
         for numbered, rate, start in zip(tones, rates, starts, strict=True)
     ]
     result = []
-    for evidence, rate, items in zip(coherent_evidence(heard, questions, step_s), rates, candidates, strict=True):
+    answers = coherent_evidence(heard, questions, folding.places.motion.step_s)
+    for evidence, rate, items in zip(answers, rates, candidates, strict=True):
         weighed = evidence + grid.prior[rate]
         winner = int(np.argmax(weighed))
         result.append((float(weighed[winner]), items[winner]))
@@ -326,15 +245,10 @@ def _weigh(
 
 
 def _surroundings(
-    heard: Heard,
-    grid: Grid,
-    tones: Sequence[Sequence[Tones]],
-    starts: Sequence[int],
-    motion: Motion,
-    lead: int,
-    shifts: Floats,
+    places: Places, coarse: int, tones: Sequence[Sequence[Tones]], starts: Sequence[int], shifts: Floats
 ) -> list[Found]:
     """For each codebook the best timing around its start: all fine rates of the grid, onsets `shifts` cells later."""
+    heard, grid, motion = places.heard(coarse), places.grid(coarse), places.motion
     around = {}
     for start in set(starts):
         lags = grid.lags[:, start][:, None, :] + shifts[None, :, None]
@@ -345,6 +259,6 @@ def _surroundings(
     for answer, start in zip(coherent_evidence(heard, questions, motion.step_s), starts, strict=True):
         evidence = answer.reshape(-1, len(shifts)) + grid.prior[:, None]
         rate, shift = np.unravel_index(np.argmax(evidence), evidence.shape)
-        onset_s = motion.start_s + (float(grid.starts[start] + shifts[shift]) - lead) * motion.step_s
+        onset_s = motion.start_s + (float(grid.starts[start] + shifts[shift]) - places.lead) * motion.step_s
         result.append(Found(Timing(onset_s, float(grid.rates_hz[rate])), float(evidence[rate, shift])))
     return result

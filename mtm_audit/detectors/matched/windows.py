@@ -15,8 +15,13 @@ from mtm_audit.model.track import Floats
 from mtm_onboard.protocol.codebook import Codebook
 from mtm_onboard.protocol.scheme import Channel
 
+# As the dtype is: either way what is told of windows is in full precision.
+Heard = NDArray[np.float64] | NDArray[np.float32]
+
 # A window counts when at least this part of it is in the recording.
 LEAST_PART = 0.3
+# Candidates whose products with all plants' moments are held at once.
+_TOGETHER = 128
 
 
 @dataclass(frozen=True)
@@ -129,7 +134,7 @@ def statistics(window: Window, tones: Floats, rows: Floats, noise: NoiseModel, r
     few = len(flat) <= width
     # Few candidates are cheapest as waveforms, many as quadratic forms of their tones; either way what is fewer is
     # whitened, once for all axes whose filter is the same.
-    signals = flat @ rows if few else rows
+    signals: Heard = flat @ rows if few else rows.astype(np.float32)
     for mine, heard in whitened_by_filter(signals, filters, history):
         found = (
             _from_waveforms(heard.reshape(len(rows), count, axes, -1), pulled[mine], weights[mine])
@@ -152,7 +157,7 @@ def pulled_by(window: Window, noise: NoiseModel, residual: Floats) -> tuple[Floa
     return weights / scales[:, None] * observed, weights, filters, window.first - before
 
 
-def whitened_by_filter(signals: Floats, filters: Floats, history: int) -> list[tuple[NDArray[np.int64], Floats]]:
+def whitened_by_filter(signals: Heard, filters: Floats, history: int) -> list[tuple[NDArray[np.int64], Heard]]:
     """Signals whitened from silence, once for each filter and the observed axes that have it."""
     return [
         (np.flatnonzero(np.all(filters == own, axis=1)), whitened_from_silence(signals, history, own))
@@ -160,7 +165,7 @@ def whitened_by_filter(signals: Floats, filters: Floats, history: int) -> list[t
     ]
 
 
-def _from_waveforms(waveforms: Floats, pulled: Floats, weights: Floats) -> Statistics:
+def _from_waveforms(waveforms: Heard, pulled: Floats, weights: Floats) -> Statistics:
     """`waveforms` (plants, L, A, n) whitened, `pulled` and `weights` (observed axes, n)."""
     plants, candidates, axes, _ = waveforms.shape
     information = np.einsum("plan,dn->dlpa", waveforms, pulled, optimize=True)
@@ -172,24 +177,22 @@ def _from_waveforms(waveforms: Floats, pulled: Floats, weights: Floats) -> Stati
     return Statistics(information, precision)
 
 
-def _from_tones(flat: Floats, axes: int, heard: Floats, pulled: Floats, weights: Floats) -> Statistics:
-    """The same numbers through the tones' second moments."""
+def _from_tones(flat: Floats, axes: int, heard: Heard, pulled: Floats, weights: Floats) -> Statistics:
+    """The same numbers through the tones' second moments, with products in the precision of `heard`."""
     plants, width = heard.shape[:2]
-    count = len(flat) // axes
-    tones = flat.reshape(count, axes, width)
+    tones = flat.astype(heard.dtype).reshape(-1, axes, width)
+    count = len(tones)
     information = np.empty((len(pulled), count, plants, axes))
     precision = np.empty((len(pulled), count, plants, axes, axes))
     for axis in range(len(pulled)):
-        projection = heard @ pulled[axis]
+        projection = (heard @ pulled[axis].astype(heard.dtype)).astype(np.float64)
         information[axis] = (flat @ projection.T).reshape(count, axes, plants).transpose(0, 2, 1)
-        roots = np.sqrt(weights[axis])
-        # One plant after the other, so that nothing leaves the processor's cache meanwhile.
-        for plant, own in enumerate(heard):
-            # Written as a square, of which half is computed.
-            weighted = own * roots
-            turned = (flat @ (weighted @ weighted.T)).reshape(count, axes, width)
-            for one in range(axes):
-                for other in range(one, axes):
-                    product = np.einsum("lk,lk->l", turned[:, one], tones[:, other])
-                    precision[axis, :, plant, one, other] = precision[axis, :, plant, other, one] = product
+        # Written as a square, of which half is computed.
+        weighted = heard * np.sqrt(weights[axis]).astype(heard.dtype)
+        moments = (weighted @ weighted.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(width, plants * width)
+        for first in range(0, count, _TOGETHER):
+            some = tones[first : first + _TOGETHER]
+            turned = (some.reshape(-1, width) @ moments).reshape(len(some), axes * plants, width)
+            products = (turned @ some.transpose(0, 2, 1)).reshape(len(some), axes, plants, axes)
+            precision[axis, first : first + _TOGETHER] = products.transpose(0, 2, 1, 3)
     return Statistics(information, precision)

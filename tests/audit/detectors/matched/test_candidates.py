@@ -40,7 +40,20 @@ def test_a_large_alphabet_s_tones_are_those_of_its_symbols(counted):
     tones = large.tones(channel_of(large), 1)
     assert whole == pytest.approx(np.concatenate([tones.real, -tones.imag], axis=-1), rel=1e-6)
     chosen = WindowTones(large, channel_of(large), 1).of(np.array([7, 3]))
-    assert np.array_equal(chosen, np.concatenate([tones.real, tones.imag], axis=-1)[[7, 3]])
+    assert chosen == pytest.approx(np.concatenate([tones.real, tones.imag], axis=-1)[[7, 3]], rel=1e-6)
+
+
+def test_chosen_symbols_are_derived_where_the_whole_is_not_kept(counted):
+    large = codebook_of(12)
+    tones = large.tones(channel_of(large), 1, [7, 3])
+    counted.clear()
+    chosen = WindowTones(large, channel_of(large), 1).of(np.array([7, 3]))
+    assert counted == [[7, 3]]
+    assert np.array_equal(chosen, np.concatenate([tones.real, tones.imag], axis=-1))
+    stacked_tones(large, channel_of(large), 1)
+    counted.clear()
+    assert WindowTones(large, channel_of(large), 1).of(np.array([7, 3])) == pytest.approx(chosen, rel=1e-6)
+    assert counted == []
 
 
 def test_a_large_alphabet_is_derived_once_for_all_stages(counted):

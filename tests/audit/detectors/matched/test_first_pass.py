@@ -30,7 +30,8 @@ def test_a_large_alphabet_keeps_the_same_candidates(monkeypatch, seed):
     assert few_weighed.kept.tolist() == all_weighed.kept.tolist()
     assert few_weighed.kept[0] == run.symbols[seed % 4]
     kept = all_weighed.kept
-    assert few_weighed.ratios[0][kept] == pytest.approx(all_weighed.ratios[0][kept], rel=1e-9, abs=1e-9)
+    # Products of tones are in single precision, whichever candidates they are of.
+    assert few_weighed.ratios[0][kept] == pytest.approx(all_weighed.ratios[0][kept], abs=1e-5)
 
 
 def test_a_rough_look_is_near_the_exact_one(monkeypatch):
