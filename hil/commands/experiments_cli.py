@@ -326,6 +326,13 @@ def identify(
     offset: Annotated[
         float, typer.Option(metavar="SECONDS", help="Added to the commands' times, such as when a journal begins.")
     ] = 0.0,
+    heading_axis: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AXIS",
+            help="Axis of the tracked robot that points ahead: x, z, -y and so on (default: one that is level).",
+        ),
+    ] = None,
     plant: Annotated[
         Path | None, typer.Option(metavar="FILE.toml", help="A plant file to write, for bench --plants and record.")
     ] = None,
@@ -343,10 +350,15 @@ def identify(
     with reported_console("mtm-hil identify", out, plant, profile, force=force) as console:
         from hil.commands.identify import IdentifyOptions
         from hil.commands.identify import identify as run
+        from mtm_audit.readers.logs.options import ReadOptions
+        from mtm_onboard.protocol.errors import command_line_values
 
+        with command_line_values():
+            ReadOptions(heading_axis=heading_axis)
         options = IdentifyOptions(
             files=tuple(files),
             offset_s=offset,
+            heading_axis=heading_axis,
             summary=summary,
             source=source,
             plant=plant,

@@ -33,11 +33,13 @@ _COLUMNS = (
 class IdentifyOptions:
     """What the command line asked for: `files` are commands and motion of each robot in turn.
 
-    `offset_s` is added to the times of commands; `summary` and `source` are what the plant file says of itself.
+    `offset_s` is added to the times of commands; `heading_axis` is the axis of the tracked bodies that points ahead,
+    None for one that lies level; `summary` and `source` are what the plant file says of itself.
     """
 
     files: tuple[Path, ...]
     offset_s: float
+    heading_axis: str | None = None
     summary: str
     source: str
     plant: Path | None
@@ -60,7 +62,7 @@ def identify(options: IdentifyOptions, console: Console) -> None:
         raise MtmError("name two files for each robot: its commands, then how it moved")
     runs: list[tuple[str, list[MeasuredAxis]]] = []
     for commands, truth in zip(options.files[::2], options.files[1::2], strict=True):
-        run = logged_run(read_commands(commands, options.offset_s), read_truth(truth), RATE_HZ)
+        run = logged_run(read_commands(commands, options.offset_s), read_truth(truth, options.heading_axis), RATE_HZ)
         runs.append((commands.stem, measured_axes(run, commands)))
     console.print(_table(runs))
     _mention_feedback(runs)
@@ -187,4 +189,6 @@ def _row(run: str, axis: MeasuredAxis) -> tuple[object, ...]:
 
 def _command(options: IdentifyOptions) -> str:
     names = " ".join(path.name for path in options.files)
-    return f"mtm-hil identify {names}" + (f" --offset {options.offset_s:g}" if options.offset_s else "")
+    offset = f" --offset {options.offset_s:g}" if options.offset_s else ""
+    axis = f" --heading-axis {options.heading_axis}" if options.heading_axis is not None else ""
+    return f"mtm-hil identify {names}{offset}{axis}"

@@ -13,8 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from hil.experiments.detectors.body_frame import in_body_frame
-from mtm_audit.ingest.load import load_tracks
+from mtm_audit.ingest.load import is_video, load_tracks
 from mtm_audit.model.track import Floats, Track
+from mtm_audit.readers.logs.options import ReadOptions
+from mtm_audit.readers.logs.registry import read_log
 from mtm_audit.readers.text import read_lines
 from mtm_onboard.model.velocity import AXES
 from mtm_onboard.protocol import MtmError
@@ -65,14 +67,20 @@ def read_commands(path: Path, later_s: float = 0.0) -> CommandLog:
     return CommandLog(np.asarray(times_s[order][last] + later_s), np.asarray(velocities[order][last]))
 
 
-def read_truth(path: Path) -> Track:
-    """Read a file of the robot's motion with headings; raises MtmError when it is no such file or has no headings."""
+def read_truth(path: Path, heading_axis: str | None = None) -> Track:
+    """Read a file of the robot's motion with headings; raises MtmError when it is no such file or has no headings.
+
+    `heading_axis` is the axis of the tracked body that points ahead, such as `x` or `-z`; without it the one that lies
+    level.
+    """
+    if heading_axis is not None and (path.suffix.lower() == ".dat" or is_video(path)):
+        raise MtmError(f"{path} states the heading itself; leave --heading-axis out")
     if path.suffix.lower() == ".dat":
         rows = _numbers(path, read_lines(path), _TRUTH, "'time x y heading'")
         kept = np.concatenate([[True], np.diff(np.maximum.accumulate(rows[:, 0])) > 0.0])
         rows = rows[kept]
         return Track(path.stem, rows[:, 0], rows[:, 1:3], np.ones(len(rows), bool), headings_rad=rows[:, 3])
-    tracks = load_tracks(path)
+    tracks = load_tracks(path) if is_video(path) else read_log(path, ReadOptions(heading_axis=heading_axis)).tracks
     if len(tracks) != 1:
         raise MtmError(f"{path} shows {len(tracks)} bodies; name a recording of one robot")
     if tracks[0].headings_rad is None:

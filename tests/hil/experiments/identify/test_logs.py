@@ -103,6 +103,27 @@ def test_motion_without_headings_gets_one_sentence(tmp_path):
         read_truth(tmp_path / "a.csv")
 
 
+def test_the_axis_that_points_ahead_may_be_told(tmp_path):
+    level = "".join(f"{row / 10} 0 0 0 0 0 0 1\n" for row in range(20))
+    (tmp_path / "a.tum").write_text(level)
+    ahead, left = (read_truth(tmp_path / "a.tum", axis) for axis in ("x", "y"))
+    assert ahead.headings_rad == pytest.approx(np.zeros(20))
+    assert left.headings_rad == pytest.approx(np.full(20, np.pi / 2))
+
+
+def test_an_axis_of_what_states_its_heading_gets_one_sentence(tmp_path):
+    _, truth = write_mrclam(tmp_path, seconds=5.0)
+    with pytest.raises(MtmError, match="states the heading itself; leave --heading-axis out"):
+        read_truth(truth, "x")
+
+
+@pytest.mark.parametrize("axis", ["w", "xy", ""])
+def test_an_axis_that_is_none_gets_one_sentence(tmp_path, axis):
+    (tmp_path / "a.tum").write_text("0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n")
+    with pytest.raises(MtmError, match="axis"):
+        read_truth(tmp_path / "a.tum", axis)
+
+
 def test_logs_of_different_times_get_one_sentence():
     commands = CommandLog(np.array([0.0, 9.0]), np.zeros((2, 3)))
     with pytest.raises(MtmError, match="at no time together; give --offset"):
