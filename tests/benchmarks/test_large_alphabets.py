@@ -92,8 +92,8 @@ def test_large_alphabets_take_what_4096_symbols_took(benchmark, baseline, capsys
         print(f"\nM = 4096 {quicker:.1f} times quicker; M = 65536 takes {larger:.2f} of what M = 4096 took")
     benchmark.pedantic(lambda: None, rounds=1)
     assert peak_mb < 500.0
-    assert quicker > 4.0
-    assert larger < 1.2
+    assert quicker > 5.0
+    assert larger < 1.0
 
 
 def test_a_wrong_key_of_a_large_alphabet_is_told_soon(benchmark, baseline, capsys):
@@ -107,7 +107,7 @@ def test_a_wrong_key_of_a_large_alphabet_is_told_soon(benchmark, baseline, capsy
     benchmark.pedantic(lambda: None, rounds=1)
     assert large[1] < 500.0
     assert now[0] < then[0]
-    assert large[0] < 3.0 * then[0]
+    assert large[0] < 2.5 * then[0]
 
 
 @pytest.mark.parametrize("ticks", [200, 100])
