@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mtm_audit.detectors.base import Observation
-from mtm_audit.detectors.matched import candidates, coherent, correlate, folding, search
+from mtm_audit.detectors.matched import candidates, coherent, correlate, folding, relief, search
 from mtm_audit.detectors.matched.detector import MatchedDetector
 from mtm_audit.detectors.matched.rates import Rates
 from mtm_audit.model.glimpse import glimpse_of_track
@@ -18,6 +18,8 @@ def read(monkeypatch, whole, *, rate_scale=1.0, key=KEY, seconds=26.0):
     """A robot's reading, of an alphabet that counts as large above `whole` symbols; onset and clock are to be found."""
     for place in (candidates, coherent, search):
         monkeypatch.setattr(place, "WHOLE", whole)
+    # Its interference is taken for a large alphabet's either way, so that the short cuts alone differ.
+    monkeypatch.setattr(relief, "WHOLE", 64)
     monkeypatch.setattr(coherent, "_NEAR_A_CELL", 40)
     track = robot_track(KEY, "robot0", SYMBOLS, seconds, onset_s=0.7, rate_scale=rate_scale)
     observation = Observation(key.scheme.channels[0], glimpse_of_track(track))

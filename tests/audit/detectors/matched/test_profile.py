@@ -125,7 +125,7 @@ def test_a_faulty_file_is_refused_in_one_sentence(tmp_path, edit, sentence):
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_of_the_format_before_notches_is_read_without_them(tmp_path):
+def test_a_file_of_the_former_format_knows_no_notches(tmp_path):
     weights = np.where(np.isinf(FINE.notches_hz), 1.0, 0.0)
     text = profile_text(PlantProfile(weights / weights.sum()))
     rows = [row for row in text.splitlines() if "notch_hz" not in row or "notch_hz = inf" in row]

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from mtm_audit.detectors.matched import relief as module
-from mtm_audit.detectors.matched.relief import Relief
+from mtm_audit.detectors.matched.correlate import Heard
+from mtm_audit.detectors.matched.relief import Relief, relief_of
 
 WIDTH = 12
 
@@ -11,7 +12,7 @@ def case(observed, axes, starts, seed=0):
     """A relief, what was heard in 3 windows of 4 hypotheses, the weights of their cells, and gains."""
     rng = np.random.default_rng(seed)
     power = rng.uniform(0.001, 0.01, (observed, axes)).astype(np.float32)
-    relief = Relief(power, rng.uniform(0.1, 1.0, (observed, WIDTH)), rng.uniform(0.05, 0.1, WIDTH), 100)
+    relief = Relief(power, rng.uniform(0.1, 1.0, (observed, WIDTH)), rng.uniform(0.05, 0.1, WIDTH), 100, 0.8)
     columns = rng.normal(0.0, 5.0, (4, 3, observed, WIDTH)).astype(np.float32)
     weights, gains = rng.uniform(0.0, 90.0, (4, 3, observed)), rng.standard_normal((4, starts, observed * axes))
     return relief, columns, weights, gains.astype(np.float32)
@@ -32,6 +33,18 @@ def test_chance_shows_the_sum_over_its_tones(monkeypatch, observed, axes, starts
     assert found == pytest.approx(
         0.5 * np.sum(linear**2 * relief.spread / grown - np.log(grown), axis=(3, 4)), rel=1e-5, abs=1e-4
     )
+
+
+@pytest.mark.parametrize(("count", "quieter"), [(64, False), (2048, True)])
+def test_only_a_large_alphabet_makes_the_interference_quieter(count, quieter):
+    rng = np.random.default_rng(2)
+    heard = Heard(
+        rng.standard_normal((2, WIDTH, 9)).astype(np.float32), np.arange(1.0, 7.0), np.full((2, WIDTH), 0.5),
+        np.full(WIDTH, 1 / 6), np.full((2, 9), 90.0), 100,
+    )  # fmt: skip
+    tones = (0.4 * rng.standard_normal((count, 2, WIDTH))).astype(np.float32)
+    factors = relief_of(heard, tones).factors(np.full((1, 1, 4), 0.3, dtype=np.float32))
+    assert np.all(factors > 1.0) if quieter else np.all(factors == 1.0)
 
 
 def test_chance_shows_the_mean_over_normal_waveforms():
