@@ -14,7 +14,7 @@ from mtm_audit.detectors.matched.fleet import Member, share_timings
 from mtm_audit.detectors.matched.hypotheses import log_rate_prior
 from mtm_audit.detectors.matched.kinds import elsewhere, reading_order
 from mtm_audit.detectors.matched.motion import Motion, uniform_motion
-from mtm_audit.detectors.matched.noise import principal_axes
+from mtm_audit.detectors.matched.noise import NoiseModel, principal_axes
 from mtm_audit.detectors.matched.profile import PlantProfile
 from mtm_audit.detectors.matched.refine import refined_timing
 from mtm_audit.detectors.matched.search import SEARCHED_RATES, search_timings
@@ -125,10 +125,11 @@ class MatchedDetector:
         moved = [prepared[number].motion for number in numbers]
         own = [channels[number] for number in numbers]
         noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
-        timings = self._likeliest(codebook, channels, prepared, numbers, searched, onset, others)
+        names = [channel.name for channel in own]
+        searched_timings = [searched[number][0].timing for number in numbers]
+        timings = self._likeliest(codebook, own, moved, noise, searched_timings, onset, others)
         shown = [shown_numbers(codebook, *each, onset) for each in zip(own, moved, timings, strict=True)]
         windows = _all_windows(codebook, own, moved, timings, shown)
-        names = [channel.name for channel in own]
         found = estimate(windows, moved, noise, self._profile, elsewhere(windows, names, timings, others))
         clock_hz = codebook.scheme.rate_hz if isinstance(onset, OnsetRange) else None
         better = refined_timing(found, windows, moved, timings, clock_hz)
@@ -149,10 +150,10 @@ class MatchedDetector:
     def _likeliest(
         self,
         codebook: Codebook,
-        channels: dict[int, Channel],
-        prepared: dict[int, Prepared],
-        numbers: Sequence[int],
-        searched: dict[int, list[Found]],
+        channels: Sequence[Channel],
+        motions: Sequence[Motion],
+        noise: NoiseModel,
+        found: list[Timing],
         onset: Onset,
         others: Mapping[str, Reading],
     ) -> list[Timing]:
@@ -160,20 +161,17 @@ class MatchedDetector:
 
         The search knows one plant, and lays windows late for a robot that lags otherwise.
         """
-        found = [searched[number][0].timing for number in numbers]
         if not isinstance(onset, int | float):
             return found
-        moved, own = [prepared[number].motion for number in numbers], [channels[number] for number in numbers]
-        noise = fit_recording_noise(moved, [motion.velocities for motion in moved])
-        names = [channel.name for channel in own]
+        names = [channel.name for channel in channels]
         best, most = found, -np.inf
         for timings in _near_known(found, float(onset), codebook.scheme.rate_hz):
-            shown = [shown_numbers(codebook, *each, onset) for each in zip(own, moved, timings, strict=True)]
+            shown = [shown_numbers(codebook, *each, onset) for each in zip(channels, motions, timings, strict=True)]
             if not all(map(len, shown)):
                 continue
-            windows = _all_windows(codebook, own, moved, timings, shown)
+            windows = _all_windows(codebook, channels, motions, timings, shown)
             beside = elsewhere(windows, names, timings, others)
-            evidence = first_evidence(windows, moved, noise, self._profile, beside)
+            evidence = first_evidence(windows, motions, noise, self._profile, beside)
             evidence += _log_clock_prior(timings, codebook.scheme.rate_hz)
             if evidence > most:
                 best, most = timings, evidence

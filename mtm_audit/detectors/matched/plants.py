@@ -62,15 +62,11 @@ def returning(family: Plants, returns_s: Sequence[float]) -> Plants:
 
 def notched(family: Plants, notches_hz: Sequence[float], quality: float) -> Plants:
     """The family's plants behind a second-order notch filter, once for each of its frequencies."""
-    impulse = np.zeros(family.taps.shape[1])
-    impulse[0] = 1.0
-    taps = []
-    for notch_hz in notches_hz:
-        passed = signal.lfilter(*signal.iirnotch(notch_hz, quality, fs=1.0 / TAP_S), impulse)
-        taps += [np.convolve(own, passed)[: len(own)] for own in family.taps]
+    filters = [signal.iirnotch(notch_hz, quality, fs=1.0 / TAP_S) for notch_hz in notches_hz]
+    taps = [signal.lfilter(*each, family.taps, axis=1) for each in filters]
     times, count = len(notches_hz), len(family.taps)
     return Plants(np.tile(family.delays_s, times), np.tile(family.lags_s, times), np.tile(family.returns_s, times),
-                  np.repeat(notches_hz, count), np.array(taps))  # fmt: skip
+                  np.repeat(notches_hz, count), np.concatenate(taps))  # fmt: skip
 
 
 def without_notches(family: Plants) -> Plants:

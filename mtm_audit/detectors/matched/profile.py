@@ -97,9 +97,9 @@ def load_profile(path: Path) -> PlantProfile:
         raise MtmError(f"{path} does not list the {len(listed)} plants of this program; make it anew with "
                        "mtm-audit profile")  # fmt: skip
     names = _NAMES if version == PROFILE_FORMAT else _NAMES[:-1]
-    weights = np.zeros(len(FINE.taps))
+    weights, parameters = np.zeros(len(FINE.taps)), _parameters()
     for number, plant in enumerate(listed.tolist()):
-        weights[plant] = _weight(path, rows[number], number, dict(zip(names, _parameters()[plant], strict=False)))
+        weights[plant] = _weight(path, rows[number], number, dict(zip(names, parameters[plant], strict=False)))
     if abs(weights.sum() - 1.0) > 0.01:
         raise MtmError(f"{path}: the weights add up to {weights.sum():.3g} and not to 1; make it anew with "
                        "mtm-audit profile")  # fmt: skip
